@@ -1,0 +1,1 @@
+"""Questions: one module for each published table or figure, studies, the command line."""

@@ -1,0 +1,1 @@
+"""The SIMT machine: counting rules, occupancy, memory, atomics, time. It knows no triangle, tile or patch."""

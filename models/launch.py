@@ -1,0 +1,64 @@
+"""A launch: what one kernel asks of the machine, by unit of work."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One buffer as one launch touches it: what caches need to know.
+
+    Parameters
+    ----------
+    buffer : str
+        Name of the buffer; the same name in an earlier launch of the frame means that it may still be in a cache.
+    op : {"load", "store", "atomic"}
+    bytes : int
+        Bytes of all transactions on it.
+    footprint_bytes : int
+        Bytes of the distinct segments touched.
+    """
+
+    buffer: str
+    op: Literal["load", "store", "atomic"]
+    bytes: int
+    footprint_bytes: int
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One kernel launch in machine events.
+
+    Parameters
+    ----------
+    stage, kernel : str
+        The stage that it is reported under, and the kernel's own name.
+    grid, block : int
+        Blocks, and threads in a block.
+    registers : int
+        32-bit registers a thread.
+    shared_bytes : int
+        Shared memory a block.
+    events : ndarray, (units, len(MachineEvent)), float64
+        Machine events of each unit of work, in the order in which units start.
+    dispatch : {"blocks", "block_queue", "warp_queue"}
+        What a unit is: a block of the grid, or an item that a persistent block or warp draws from a queue.
+    streams : tuple of Stream
+        The buffers touched.
+    atomic_requests : ndarray, (chunks,), int64, or None
+        Requests of global atomics by 32-byte chunk of the target buffer: who queues where.
+    """
+
+    stage: str
+    kernel: str
+    grid: int
+    block: int
+    registers: int
+    shared_bytes: int
+    events: NDArray[np.float64]
+    dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
+    streams: tuple[Stream, ...] = ()
+    atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)

@@ -1,0 +1,37 @@
+"""A frame: what a pipeline made, before anything is priced."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.work import Work
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The picture of one pipeline and the work of its stages, in launch order.
+
+    Parameters
+    ----------
+    image : ndarray, (H, W, 3), uint8
+        Row 0 is the top row.
+    depth : ndarray, (H, W)
+        In the pipeline's own format (float32, or the original's uint32).
+    works : list of Work
+        One for each kernel launch.
+    triangle_ids : ndarray, (H, W), int32, or None
+        Input index of the visible triangle, -1 where nothing was drawn.
+    maps : dict of str to ndarray
+        Heat maps by counter, a cell a tile or a pixel.
+    facts : dict
+        What a report may say besides: queue lengths, memory, retries, what was given up.
+    """
+
+    image: NDArray[np.uint8]
+    depth: NDArray[Any]
+    works: list[Work]
+    triangle_ids: NDArray[np.int32] | None = None
+    maps: dict[str, NDArray[Any]] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,1 @@
+"""One module for each published system; it reads like its overview figure."""

@@ -1,0 +1,1 @@
+"""Models by name, readers, cameras, subdivision, generators."""

@@ -1,0 +1,1 @@
+"""One module for each published stage, in its paper's word."""

@@ -1,0 +1,52 @@
+"""A work table: what a stage did, one row a unit of work, one int64 column for each of its own events."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.launch import Stream
+
+
+@dataclass(frozen=True)
+class Work:
+    """What one kernel of a stage did.
+
+    Parameters
+    ----------
+    stage, kernel : str
+        The paper's word for the stage, and the kernel's name inside it.
+    events : type of IntEnum
+        The stage's own events: the columns of ``table``. An event that bears the name of a ``MachineEvent``
+        (LOAD_TRANSACTIONS, ATOMIC_REQUESTS, BANK_REPLAYS, ...) passes through the mix as it is;
+        SAMPLE_TESTS and SAMPLE_HITS are the columns that reports show by that name.
+    table : ndarray, (units, len(events)), int64
+        Row i is unit i: a block of the grid, or the item that a persistent block or warp drew from its queue.
+    grid, block : int
+        Blocks, and threads in a block.
+    shared_bytes : int
+        Shared memory a block, where the stage fixes it (a mix may add its own).
+    dispatch : {"blocks", "block_queue", "warp_queue"}
+        What a unit is.
+    streams : tuple of Stream
+        Buffers touched.
+    atomic_requests : ndarray, (chunks,), int64, or None
+        Global atomic requests by 32-byte chunk of the target buffer.
+    """
+
+    stage: str
+    kernel: str
+    events: type[IntEnum]
+    table: NDArray[np.int64]
+    grid: int
+    block: int
+    shared_bytes: int = 0
+    dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
+    streams: tuple[Stream, ...] = ()
+    atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
+
+    def total(self, event: IntEnum) -> int:
+        """Sum of one event over all units."""
+        return int(self.table[:, event].sum())
