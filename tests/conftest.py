@@ -1,0 +1,39 @@
+"""What every test may ask for: the folder of real scenes and measurements that lies beside the project."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+SHARED_VARIABLE = "TILESTAMP_SHARED"  # names the folder where it lies elsewhere
+SCENES_VARIABLE = "TILESTAMP_SCENES"  # the scene search path that users set
+
+
+def shared_folder() -> Path:
+    """Where the real scenes and measurements should be: beside the repository unless the environment says otherwise."""
+    named = os.environ.get(SHARED_VARIABLE)
+    return Path(named) if named else Path(__file__).resolve().parent.parent.parent / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Give the folder of real scenes and measurements; skip where it is missing."""
+    folder = shared_folder()
+    if not folder.is_dir():
+        pytest.skip(f"no folder {folder.name!r} beside the project: set {SHARED_VARIABLE} to where the real scenes are")
+    return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _scene_search_path():
+    """Put the real scenes on the search path for the whole session, unless the caller has set one."""
+    scenes = shared_folder() / "scenes"
+    if not scenes.is_dir() or SCENES_VARIABLE in os.environ:
+        yield
+        return
+    folders = [scenes, *sorted(path for path in scenes.iterdir() if path.is_dir())]
+    os.environ[SCENES_VARIABLE] = os.pathsep.join(map(str, folders))
+    yield
+    del os.environ[SCENES_VARIABLE]
