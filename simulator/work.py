@@ -50,3 +50,7 @@ class Work:
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""
         return int(self.table[:, event].sum())
+
+    def counts(self) -> dict[str, int]:
+        """Every event by name, summed over all units."""
+        return {event.name: self.total(event) for event in self.events}

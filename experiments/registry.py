@@ -1,0 +1,51 @@
+"""Experiments by name: a module in a paper's folder that has a function ``run`` is one (``eisenacher2010/table1``)."""
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from experiments.result import Result
+from models.errors import TilestampError
+
+Progress = Callable[[str], None]
+Experiment = Callable[[Progress], Result]
+FOLDER = Path(__file__).parent
+
+
+def experiment_names() -> list[str]:
+    """All experiments, ``paper/table``."""
+    modules = (path for path in FOLDER.glob("*/[a-z]*.py") if "\ndef run(" in path.read_text(encoding="utf-8"))
+    return sorted(f"{path.parent.name}/{path.stem}" for path in modules)
+
+
+def describe(name: str) -> str:
+    """First line of an experiment's docstring."""
+    return (import_module(_module(name)).__doc__ or "").strip().splitlines()[0]
+
+
+def load_experiment(name: str) -> Experiment:
+    """The function that runs the experiment ``name``."""
+    experiment: Experiment = import_module(_module(name)).run
+    return experiment
+
+
+def select(names: tuple[str, ...]) -> list[str]:
+    """Experiments for what a user names: ``paper/table``, a paper, or a table; all if nothing is named.
+
+    Raises
+    ------
+    TilestampError
+        A name that fits none.
+    """
+    known = experiment_names()
+    chosen: list[str] = []
+    for name in names:
+        fits = [k for k in known if name in (k, *k.split("/"))] or [k for k in known if k.startswith(name)]
+        if not fits:
+            raise TilestampError(f"no experiment is called {name}; there are {', '.join(known)}")
+        chosen += fits
+    return list(dict.fromkeys(chosen)) or known
+
+
+def _module(name: str) -> str:
+    return f"experiments.{name.replace('/', '.')}"

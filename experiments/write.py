@@ -1,0 +1,102 @@
+"""Write a result: tidy CSV, a manifest, plots; and one page over all results."""
+
+import json
+import platform
+import shutil
+import tempfile
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from experiments.result import Cell, Result
+from models.compile_cache import source_digest
+from reports.page import write_page
+
+PACKAGES = ("numpy", "numba", "pandas", "matplotlib", "trimesh")
+COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim")
+
+
+def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
+    """Write one result into ``folder/NAME``, all of it or nothing.
+
+    Returns
+    -------
+    Path
+        The result's folder.
+    """
+    import pandas as pd
+
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / result.name
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        made = Path(scratch) / result.name
+        made.mkdir()
+        pd.DataFrame([_record(cell) for cell in result.cells], columns=list(COLUMNS)).to_csv(
+            made / "cells.csv", index=False
+        )
+        for name, table in result.tables.items():
+            table.to_csv(made / f"{name}.csv", index=False)
+        for figure in result.figures:
+            figure.draw(made / f"{figure.name}.png")
+        (made / "manifest.json").write_text(json.dumps(_manifest(result, options), indent=1) + "\n")
+        shutil.rmtree(target, ignore_errors=True)
+        made.rename(target)
+    return target
+
+
+def _record(cell: Cell) -> dict[str, Any]:
+    """A cell as a tidy row."""
+    return {name: getattr(cell, name) for name in COLUMNS}
+
+
+def _manifest(result: Result, options: dict[str, Any]) -> dict[str, Any]:
+    """What made the result: versions, digest of the sources, options, warnings."""
+    return {
+        "experiment": result.name,
+        "source": result.source,
+        "tilestamp": version("tilestamp"),
+        "source_digest": source_digest(),
+        "python": platform.python_version(),
+        "packages": {name: version(name) for name in PACKAGES},
+        "options": options,
+        "warnings": result.warnings,
+    }
+
+
+def write_index(results: Sequence[Result], folder: Path) -> Path:
+    """Write the page over all results."""
+    path = folder / "index.html"
+    introduction = (
+        "Published cells beside what tilestamp computes. A fitted cell had a parameter chosen on it, so its error says "
+        "nothing and is never averaged; a predicted one had none. Red: outside the aim."
+    )
+    footer = f"tilestamp {version('tilestamp')}, sources {source_digest()}"
+    write_page(path, "tilestamp: papers beside the model", introduction, [_section(r) for r in results], footer)
+    return path
+
+
+def _section(result: Result) -> dict[str, Any]:
+    """One result for the page."""
+    return {
+        "name": result.name,
+        "title": result.title,
+        "source": result.source,
+        "warnings": result.warnings,
+        "notes": result.notes,
+        "columns": COLUMNS,
+        "error_column": COLUMNS.index("error"),
+        "rows": [
+            {"cells": cell_texts(cell), "marks": f"{cell.status} {'missed' if cell.missed else ''}"}
+            for cell in result.cells
+        ],
+        "figures": [f"{result.name}/{figure.name}.png" for figure in result.figures],
+    }
+
+
+def cell_texts(cell: Cell) -> tuple[str, ...]:
+    """A cell as the texts of its columns."""
+    error = "" if cell.error is None else f"{100 * cell.error:+.1f} %"
+    aim = "" if cell.aim is None else f"{100 * cell.aim:.0f} %"
+    published = "" if cell.published is None else f"{cell.published:,.4g}"
+    return (cell.row, cell.column, cell.unit, published, f"{cell.ours:,.4g}", error, cell.status, aim)

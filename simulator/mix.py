@@ -1,0 +1,160 @@
+"""Instruction mixes: what one event of a stage costs in warp instructions, by pipeline and compute capability.
+
+A mix file (``simulator/mixes/PIPELINE/ccN.toml``) has a table for each kernel, and in it a table for each event::
+
+    [tile_raster]
+    registers = 20
+    provenance = "assumed"
+    source = "where the numbers come from"
+
+    [tile_raster.BOX_WARPS]      # one warp runs the edge code once
+    fp32 = 28
+    shared = 4
+    chain_alu = 12               # dependent instructions on a unit's critical warp
+    lanes = "BOX_LANES"          # the event that counts the lanes active meanwhile; absent: whole warps
+
+An event that bears the name of a machine event needs no table: it passes through.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
+from models.launch import Launch
+from simulator.work import Work
+
+MIXES = Path(__file__).parent / "mixes"
+PROVENANCES = ("published", "measured", "disassembled", "derived", "fitted", "assumed")
+_ABOUT = {"provenance", "source", "lanes"}
+_COLUMNS = {event.name.lower(): event for event in MachineEvent}
+
+
+@dataclass(frozen=True)
+class KernelMix:
+    """Prices of one kernel's events.
+
+    Parameters
+    ----------
+    registers, shared_bytes : int
+        A thread, and a block (added to what the stage itself declares).
+    prices : dict
+        By event name: warp instructions and chain steps by machine event name, and ``lanes``.
+    provenance : dict
+        By event name ("" for the kernel): (kind, source).
+    """
+
+    kernel: str
+    registers: int
+    shared_bytes: int
+    prices: dict[str, dict[str, Any]]
+    provenance: dict[str, tuple[str, str]]
+
+    def matrix(self, events: type[IntEnum], warp: int) -> NDArray[np.float64]:
+        """Prices as a matrix, (len(events), len(MachineEvent)): ``machine_events = work @ matrix``."""
+        matrix = np.zeros((len(events), EVENTS))
+        names = {event.name for event in events}
+        for event in events:
+            if event.name in MachineEvent.__members__:
+                matrix[event, MachineEvent[event.name]] = 1.0
+            for column, price in self.prices.get(event.name, {}).items():
+                if column not in _ABOUT:
+                    matrix[event, _COLUMNS[column]] += price
+        for name, price in self.prices.items():
+            if name not in names:
+                raise TilestampError(f"the mix of {self.kernel} prices {name}, which the stage does not count")
+            self._add_lanes(matrix, events, events[name], price, warp)
+        return matrix
+
+    def _add_lanes(
+        self, matrix: NDArray[np.float64], events: type[IntEnum], event: IntEnum, price: dict[str, Any], warp: int
+    ) -> None:
+        """Active lane instructions: each instruction of the event, times the lanes that run it."""
+        issued = sum(price.get(c.name.lower(), 0.0) for c in INSTRUCTION_CLASSES)
+        if event.name in MachineEvent.__members__ and MachineEvent[event.name] in INSTRUCTION_CLASSES:
+            issued += 1.0
+        lanes = price.get("lanes", warp)
+        if isinstance(lanes, str):
+            if lanes not in events.__members__:
+                raise TilestampError(f"the mix of {self.kernel} counts the lanes of {event.name} by {lanes}: no such event")
+            matrix[events[lanes], MachineEvent.LANES] += issued
+        else:
+            matrix[event, MachineEvent.LANES] += issued * lanes
+
+
+@dataclass(frozen=True)
+class Mix:
+    """All kernels of one pipeline for one family of compute capability."""
+
+    name: str
+    kernels: dict[str, KernelMix]
+
+    def launch(self, work: Work, warp: int) -> Launch:
+        """Price a work table in machine events.
+
+        Parameters
+        ----------
+        work : Work
+        warp : int
+            Lanes in a warp of the machine.
+        """
+        if work.kernel not in self.kernels:
+            raise TilestampError(f"the mix {self.name} has no kernel {work.kernel}")
+        kernel = self.kernels[work.kernel]
+        return Launch(
+            stage=work.stage,
+            kernel=work.kernel,
+            grid=work.grid,
+            block=work.block,
+            registers=kernel.registers,
+            shared_bytes=work.shared_bytes + kernel.shared_bytes,
+            events=work.table.astype(np.float64) @ kernel.matrix(work.events, warp),
+            dispatch=work.dispatch,
+            streams=work.streams,
+            atomic_requests=work.atomic_requests,
+        )
+
+
+@cache
+def load_mix(pipeline: str, compute_capability: str) -> Mix:
+    """Read the mix of ``pipeline`` for the newest family that is not newer than ``compute_capability``.
+
+    Raises
+    ------
+    TilestampError
+        No mix, an unknown column, or a number without provenance.
+    """
+    path = _path_for(pipeline, int(float(compute_capability)))
+    tables = tomllib.loads(path.read_text())
+    name = f"{pipeline}/{path.stem}"
+    return Mix(name, {kernel: _kernel_mix(name, kernel, table) for kernel, table in tables.items()})
+
+
+def _path_for(pipeline: str, major: int) -> Path:
+    """The mix file of the newest family up to ``major``, else the oldest."""
+    families = sorted((int(path.stem.removeprefix("cc")), path) for path in (MIXES / pipeline).glob("cc*.toml"))
+    if not families:
+        raise TilestampError(f"no instruction mix for the pipeline {pipeline} in simulator/mixes")
+    return max([f for f in families if f[0] <= major] or families[:1])[1]
+
+
+def _kernel_mix(mix: str, kernel: str, table: dict[str, Any]) -> KernelMix:
+    """Check one kernel's table and take it apart."""
+    prices = {event: price for event, price in table.items() if isinstance(price, dict)}
+    about = {"": (str(table.get("provenance", "")), str(table.get("source", "")))}
+    for event, price in prices.items():
+        about[event] = (str(price.get("provenance", about[""][0])), str(price.get("source", about[""][1])))
+        for column in price.keys() - _ABOUT:
+            if column not in _COLUMNS:
+                raise TilestampError(f"the mix {mix} prices {kernel}.{event} in {column}: no such machine event")
+    for event, (kind, _) in about.items():
+        if kind not in PROVENANCES:
+            raise TilestampError(f"the mix {mix} does not say where {kernel}.{event or 'registers'} comes from")
+    return KernelMix(kernel, int(table.get("registers", 16)), int(table.get("shared_bytes", 0)), prices, about)

@@ -1,0 +1,76 @@
+"""Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
+
+import os
+from typing import Any, Literal
+
+from models.errors import TilestampError
+from models.machine import Machine, load_machine
+from simulator.pipelines import load_pipeline, pipeline_options
+from simulator.run import Run
+from simulator.scenes import Scene, load_scene, read_camera
+
+Fidelity = Literal["counts", "bounds", "schedule"]
+BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
+
+
+def simulate(
+    scene: Scene | str,
+    pipeline: str = "micropolygon",
+    machine: Machine | str = "gtx280",
+    *,
+    width: int = 1024,
+    height: int = 768,
+    camera: Any = None,
+    fidelity: Fidelity = "schedule",
+    **options: Any,
+) -> Run:
+    """Draw ``scene`` by ``pipeline`` and price the work on ``machine``.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene, a name of the library, or a file.
+    pipeline : str
+        See ``tilestamp list pipelines``.
+    machine : Machine or str
+        A machine, a name, or a machine file.
+    width, height : int
+        Pixels.
+    camera : optional
+        A view's name, a ``LookAt``, a 4x4 model-to-clip matrix (row-major, column vectors), or a JSON file; the
+        scene's default view if not given.
+    fidelity : {"counts", "bounds", "schedule"}
+        How far to go: no time; a roofline for each launch; units of work scheduled on the machine.
+    **options
+        The pipeline's own: ``tile``, ``spp``, ``bound``, ``msaa``, ``mode``...
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    TilestampError
+        Bad input, in one sentence.
+    """
+    scene = load_scene(scene) if isinstance(scene, str) else scene
+    machine = load_machine(machine) if isinstance(machine, str) else machine
+    _check(pipeline, fidelity, width, height, options)
+    view = read_camera(camera if camera is not None else "default", scene)
+    matrix = view.matrix(width, height)
+    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, **options)
+    return Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note)
+
+
+def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:
+    """Refuse what no pipeline can draw."""
+    known = pipeline_options(pipeline)
+    for name in options.keys() - known.keys():
+        raise TilestampError(f"the pipeline {pipeline} has no option {name}; it has {', '.join(known)}")
+    if fidelity not in ("counts", "bounds", "schedule"):
+        raise TilestampError(f"fidelity is counts, bounds or schedule, not {fidelity}")
+    if width < 1 or height < 1:
+        raise TilestampError(f"an image of {width}x{height} pixels has no pixels")
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if width * height * BYTES_PER_PIXEL > memory:
+        raise TilestampError(f"an image of {width}x{height} pixels does not fit in this computer's memory")
