@@ -1,0 +1,1 @@
+"""The commands of ``tilestamp``, a module each."""

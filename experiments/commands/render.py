@@ -1,0 +1,232 @@
+"""``tilestamp render``: one picture, and the table of its stages."""
+
+import ast
+import json
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from experiments.commands.terminal import print_table, progress
+from models.errors import TilestampError
+from simulator.run import Run
+
+MapName = Literal["quads", "tests", "ste", "overdraw", "atomics"]
+SHOWN = {  # column of the terminal table: how to print it
+    "blocks": ",.0f",
+    "warps": ",.0f",
+    "instructions": ",.0f",
+    "simd_efficiency": ".3f",
+    "sample_tests": ",.0f",
+    "sample_hits": ",.0f",
+    "ste": ".4f",
+    "atomics": ",.0f",
+    "occupancy": ".2f",
+    "milliseconds": ".3f",
+    "bound": "s",
+}
+
+
+def render(
+    scene: str,
+    *,
+    pipeline: str = "micropolygon",
+    machine: str = "gtx280",
+    size: str = "1024x768",
+    camera: str | None = None,
+    fidelity: Literal["counts", "bounds", "schedule"] = "schedule",
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    map_: Annotated[MapName | None, Parameter(name="--map")] = None,
+    json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    tile: int | None = None,
+    spp: int | None = None,
+    bound: float | None = None,
+    msaa: int | None = None,
+    mode: str | None = None,
+    release: str | None = None,
+    hybrid: bool | None = None,
+    cull_backfaces: bool | None = None,
+    option: Annotated[tuple[str, ...], Parameter(name=["--option", "-O"], negative="")] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
+) -> None:
+    """Draw SCENE and print what each stage did and how long it would take.
+
+    Parameters
+    ----------
+    scene
+        A name (`tilestamp list scenes`) or a file: .bpt, .obj, .ply, .glb, .npz...
+    pipeline
+        See `tilestamp list pipelines`.
+    machine
+        See `tilestamp list machines`, or a machine file.
+    size
+        WIDTHxHEIGHT in pixels.
+    camera
+        A view of the scene by name, or a JSON file (`FILE.json`, `FILE.json:KEY`).
+    fidelity
+        counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine.
+    output
+        PNG file for the picture.
+    map_
+        Also write a heat map of this counter, beside the picture.
+    json_
+        Print one JSON object instead of tables.
+    tile
+        Edge of a screen tile in pixels.
+    spp
+        Samples a pixel (micropolygon).
+    bound
+        Sub-patches are split until their screen box is under this many pixels.
+    msaa
+        Samples a pixel (cudaraster).
+    mode
+        depth, blend, depth-only or color (cudaraster).
+    release
+        1.1 or nvdiffrast (cudaraster).
+    hybrid
+        Hand the diced grids to the fixed-function rasterizer (micropolygon).
+    cull_backfaces
+        Drop triangles that face away.
+    option
+        Any further option of the pipeline, NAME=VALUE.
+    set_
+        Change the machine for a what-if, SECTION.NAME=VALUE (`--set sm.count=60`).
+    """
+    width, height = parse_size(size)
+    _check_output(output, map_)
+    named = {"tile": tile, "spp": spp, "bound": bound, "msaa": msaa, "mode": mode, "release": release}
+    named |= {"hybrid": hybrid, "cull_backfaces": cull_backfaces}
+    options = {key: value for key, value in named.items() if value is not None}
+    options |= dict(parse_assignment(text) for text in option)
+    if map_ is not None:
+        options["maps"] = (map_,)
+    with progress(f"drawing {scene}") as say:
+        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, fidelity, options)
+        say("pricing")
+        stages = run.stages
+    if output is not None:
+        write_png(run.image, output)
+    if map_ is not None and output is not None:
+        write_map(run, map_, output.with_suffix(f".{map_}.png"))
+    if json_:
+        sys.stdout.write(json.dumps(as_json(run)) + "\n")
+    else:
+        _print_stages(run, stages, output)
+
+
+def _simulate(
+    scene: str,
+    pipeline: str,
+    machine: str,
+    changes: tuple[str, ...],
+    size: tuple[int, int],
+    camera: str | None,
+    fidelity: Any,
+    options: dict[str, Any],
+) -> Run:
+    """Load the machine with its what-ifs and simulate."""
+    from models.machine import load_machine, override
+    from simulator.simulate import simulate
+
+    described = load_machine(machine)
+    for change in changes:
+        described = override(described, *parse_assignment(change))
+    return simulate(
+        scene, pipeline, described, width=size[0], height=size[1], camera=camera, fidelity=fidelity, **options
+    )
+
+
+def parse_size(size: str) -> tuple[int, int]:
+    """Take ``1600x1200`` apart."""
+    match = re.fullmatch(r"(\d+)[xX](\d+)", size)
+    if match is None:
+        raise TilestampError(f"--size is WIDTHxHEIGHT in pixels, as 1600x1200, not {size}")
+    return int(match[1]), int(match[2])
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Take ``NAME=VALUE`` apart; a value that is no Python literal is a string."""
+    name, separator, value = text.partition("=")
+    if not separator or not name:
+        raise TilestampError(f"write NAME=VALUE, not {text}")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value
+
+
+def _check_output(output: Path | None, map_: str | None) -> None:
+    """Refuse an output that could not be written, before anything is computed."""
+    if output is None:
+        if map_ is not None:
+            raise TilestampError("--map writes beside the picture: give -o FILE.png too")
+        return
+    if output.suffix.lower() != ".png":
+        raise TilestampError(f"-o {output}: pictures are written as .png")
+    if not output.parent.is_dir():
+        raise TilestampError(f"-o {output}: there is no folder {output.parent}")
+
+
+def write_png(image: Any, path: Path) -> None:
+    """Write a picture, all of it or nothing."""
+    from PIL import Image
+
+    partial = path.with_suffix(".partial")
+    Image.fromarray(image).save(partial, format="png")
+    partial.replace(path)
+
+
+def write_map(run: Run, name: str, path: Path) -> None:
+    """Draw a counter's heat map."""
+    from reports.heatmap import heat_map
+
+    if name not in run.frame.maps:
+        raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
+    title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
+    unit = f"{name} a tile or pixel"
+    heat_map(run.frame.maps[name], path, title=title, unit=unit, width=run.width, height=run.height)
+
+
+def as_json(run: Run) -> dict[str, Any]:
+    """The run as plain data; not-a-number becomes null."""
+    stages = run.stages.astype(object).to_dict(orient="index")
+    return {
+        "scene": run.scene,
+        "note": run.note,
+        "pipeline": run.pipeline,
+        "machine": run.machine.name,
+        "width": run.width,
+        "height": run.height,
+        "fidelity": run.fidelity,
+        "options": run.options,
+        "milliseconds": run.milliseconds,
+        "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
+        "counts": run.counts,
+        "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
+    }
+
+
+def _plain(value: Any) -> Any:
+    """NumPy scalars and containers as JSON knows them."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _print_stages(run: Run, stages: Any, output: Path | None) -> None:
+    """Print the table of stages and a line of what was written."""
+    columns = {name: kind for name, kind in SHOWN.items() if name in stages}
+    rows = [
+        [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
+        for stage, row in stages[list(columns)].to_dict(orient="index").items()
+    ]
+    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {run.milliseconds:.2f} ms"
+    print_table(title, ["stage", *columns], rows)
+    for line in filter(None, [run.note, f"picture: {output}" if output else ""]):
+        sys.stdout.write(line + "\n")

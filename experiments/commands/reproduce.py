@@ -1,0 +1,64 @@
+"""``tilestamp reproduce``: published tables beside ours."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from experiments.commands.terminal import print_table, progress
+from experiments.registry import load_experiment, select
+from experiments.result import Result
+from experiments.write import COLUMNS, cell_texts, write_index, write_result
+
+RESULTS = Path("reports") / "results"
+
+
+def reproduce(
+    *names: str,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
+    json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> None:
+    """Print published tables beside what the model computes, cell by cell, and write CSV, manifests, plots and a page.
+
+    Parameters
+    ----------
+    names
+        Experiments (`tilestamp list experiments`), papers, or tables; all of them if none is given.
+    output
+        Folder for the results.
+    json_
+        Print one JSON object instead of tables.
+    """
+    results: list[Result] = []
+    chosen = select(names)
+    with progress("reproducing") as say:
+        for number, name in enumerate(chosen, 1):
+            say(f"{name} ({number} of {len(chosen)})")
+            result = load_experiment(name)(say)
+            write_result(result, output, {"names": list(names)})
+            results.append(result)
+        page = write_index(results, output)
+    if json_:
+        sys.stdout.write(json.dumps({r.name: [dict(zip(COLUMNS, cell_texts(c), strict=True)) for c in r.cells] for r in results}))
+        return
+    for result in results:
+        _print_result(result)
+    sys.stdout.write(f"\nCSV, manifests and plots: {output}; the page: {page}\n")
+
+
+def _print_result(result: Result) -> None:
+    """Print one result as a table, with its warnings above and its notes below."""
+    sys.stdout.write("\n")
+    for warning in result.warnings:
+        sys.stdout.write(f"! {warning}\n")
+    rows = [cell_texts(cell) for cell in result.cells]
+    styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
+    print_table(f"{result.title} [{result.name}]", COLUMNS, rows, styles)
+    errors = result.predicted_errors
+    if errors:
+        mean, worst = 100 * sum(errors) / len(errors), 100 * max(errors)
+        sys.stdout.write(f"{len(errors)} predicted cells: mean absolute error {mean:.1f} %, worst {worst:.1f} %\n")
+    for note in result.notes:
+        sys.stdout.write(f"- {note}\n")
