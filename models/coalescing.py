@@ -1,0 +1,140 @@
+"""Coalescing: how the addresses of one memory instruction become transactions.
+
+A warp's load or store names one address a lane. The memory system moves whole segments, so what it costs is the
+number of distinct segments, by a rule that changed with the compute capability (CUDA 4.2 guide, appendix F):
+
+======================  ==============================================================================================
+HALF_WARP_SEGMENTS      1.2 and 1.3. Each half-warp by itself: take the 128-byte segment of the lowest lane not yet
+                        served (64 bytes for 2-byte words, 32 for bytes), serve all lanes in it, halve the segment
+                        while one half alone is used, down to 32 bytes; repeat.
+WARP_LINES              2.x and 3.x through L1. Distinct 128-byte lines of the warp; 8-byte words go as two requests
+                        (half-warps), 16-byte words as four (quarter-warps).
+WARP_SECTORS            7.x and later. Distinct 32-byte sectors of the warp.
+======================  ==============================================================================================
+
+Everywhere in this package an instruction is an int64 array with the byte address of each lane, **negative where the
+lane is inactive**, and the number of lanes in use. All functions run inside stage kernels and allocate nothing.
+"""
+
+from typing import Any
+
+from numba import njit
+
+from models.simt import Coalescing
+
+HALF_WARP_SEGMENTS = int(Coalescing.HALF_WARP_SEGMENTS)
+WARP_LINES = int(Coalescing.WARP_LINES)
+HALF_WARP = 16  # lanes
+SEGMENT_BYTES = 128  # largest transaction of 1.x, and a line of all later ones
+SECTOR_BYTES = 32  # smallest transaction of every rule
+WORD_BYTES = 4
+WARP_BYTES = 128  # consecutive words of 32 lanes
+
+
+@njit(cache=True, nogil=True)
+def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
+    """Transactions of one memory instruction, and their bytes.
+
+    Parameters
+    ----------
+    addresses : ndarray, (>= lanes,), int64
+        Byte address of each lane, aligned to ``access_bytes``; negative where the lane is inactive.
+    lanes : int
+        Lanes to look at, at most 64.
+    access_bytes : int
+        Bytes that each lane reads or writes: 1, 2, 4, 8 or 16.
+    rule : int
+        A ``Coalescing``.
+
+    Returns
+    -------
+    count, bytes : int
+    """
+    count = 0
+    total = 0
+    if rule == HALF_WARP_SEGMENTS:
+        segment = min(SEGMENT_BYTES, SECTOR_BYTES * access_bytes)
+        for first in range(0, lanes, HALF_WARP):
+            n, b = _segments(addresses, first, min(first + HALF_WARP, lanes), access_bytes, segment, True)
+            count += n
+            total += b
+    elif rule == WARP_LINES:
+        request = lanes if access_bytes <= WORD_BYTES else max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
+        for first in range(0, lanes, max(1, request)):
+            n, b = _segments(addresses, first, min(first + request, lanes), access_bytes, SEGMENT_BYTES, False)
+            count += n
+            total += b
+    else:
+        count, total = _segments(addresses, 0, lanes, access_bytes, SECTOR_BYTES, False)
+    return count, total
+
+
+@njit(cache=True, nogil=True)
+def _segments(
+    addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
+) -> tuple[int, int]:
+    """Distinct segments of the lanes first..end-1 and their bytes; ``shrink`` halves a segment that is half unused."""
+    count = 0
+    total = 0
+    served = 0  # bit i: lane first + i
+    for i in range(first, end):
+        if addresses[i] < 0 or (served >> (i - first)) & 1:
+            continue
+        segment = addresses[i] // segment_bytes
+        low = addresses[i]
+        high = addresses[i] + access_bytes
+        for j in range(i, end):
+            if addresses[j] >= 0 and addresses[j] // segment_bytes == segment:
+                served |= 1 << (j - first)
+                low = min(low, addresses[j])
+                high = max(high, addresses[j] + access_bytes)
+        count += 1
+        total += _shrunk(low, high, segment_bytes) if shrink else segment_bytes
+    return count, total
+
+
+@njit(cache=True, nogil=True)
+def _shrunk(low: int, high: int, segment_bytes: int) -> int:
+    """Bytes of the smallest aligned segment, down to 32 bytes, that still holds low..high-1."""
+    size = segment_bytes
+    while size > SECTOR_BYTES and low // (size // 2) == (high - 1) // (size // 2):
+        size //= 2
+    return size
+
+
+@njit(cache=True, nogil=True)
+def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
+    """Transactions, and their bytes, when consecutive lanes access consecutive 4-byte words.
+
+    Parameters
+    ----------
+    start, size : int
+        First byte and number of bytes; beyond 128 bytes further warps go on.
+    rule : int
+        A ``Coalescing``.
+    """
+    warps = size // WARP_BYTES
+    count, total = _one_warp(start, WARP_BYTES, rule) if warps else (0, 0)
+    rest = size - warps * WARP_BYTES
+    n, b = _one_warp(start + warps * WARP_BYTES, rest, rule) if rest else (0, 0)
+    return warps * count + n, warps * total + b
+
+
+@njit(cache=True, nogil=True)
+def _one_warp(start: int, size: int, rule: int) -> tuple[int, int]:
+    """``contiguous`` for at most 128 bytes."""
+    if rule != HALF_WARP_SEGMENTS:
+        segment = SEGMENT_BYTES if rule == WARP_LINES else SECTOR_BYTES
+        count = (start + size - 1) // segment - start // segment + 1
+        return count, count * segment
+    count = 0
+    total = 0
+    for half in range(start, start + size, HALF_WARP * WORD_BYTES):
+        low = half
+        end = min(half + HALF_WARP * WORD_BYTES, start + size)
+        while low < end:
+            high = min(end, (low // SEGMENT_BYTES + 1) * SEGMENT_BYTES)
+            count += 1
+            total += _shrunk(low, high, SEGMENT_BYTES)
+            low = high
+    return count, total
