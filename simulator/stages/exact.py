@@ -1,0 +1,126 @@
+"""Arithmetic that CUDA has and Python lacks: one-rounding float32 fma, saturating conversions, bit counts.
+
+Each function is plain Python first, so that the kernels also run interpreted; compiled code gets the machine's own
+instruction through an overload.
+"""
+
+import numpy as np
+from numba import njit, types
+from numba.extending import intrinsic, overload
+
+_ROUND = 6755399441055744.0  # 1.5 * 2**52: adding and taking it away rounds a double to even
+
+
+def fma(a, b, c):
+    """a * b + c with one rounding to float32 (two roundings, the first to odd, give the same)."""
+    product = float(a) * float(b)  # exact: 48 bits
+    total = product + float(c)
+    if not np.isfinite(total):
+        return np.float32(total)
+    part = total - product
+    error = (product - (total - part)) + (float(c) - part)
+    bits = np.float64(total).view(np.int64)
+    if error != 0.0 and bits % 2 == 0:
+        bits += 1 if (error > 0) == (total > 0) else -1
+    return np.float32(np.int64(bits).view(np.float64))
+
+
+@intrinsic
+def _llvm_fma(_context, a, b, c):
+    def codegen(_context, builder, _signature, args):
+        return builder.fma(*args)
+
+    return types.float32(a, b, c), codegen
+
+
+@overload(fma, inline="never")
+def _fma(a, b, c):
+    if a == b == c == types.float32:
+        return lambda a, b, c: _llvm_fma(a, b, c)
+    return None
+
+
+def popcount(bits):
+    """Set bits of a uint64."""
+    return int(bits).bit_count()
+
+
+@intrinsic
+def _llvm_popcount(_context, bits):
+    def codegen(_context, builder, _signature, args):
+        return builder.ctpop(args[0])
+
+    return types.int64(bits), codegen
+
+
+@overload(popcount)
+def _popcount(bits):
+    return (lambda bits: _llvm_popcount(bits)) if bits == types.uint64 else None
+
+
+def lowest_bit(bits):
+    """Index of the lowest set bit of a uint64 that has one."""
+    return (int(bits) & -int(bits)).bit_length() - 1
+
+
+@intrinsic
+def _llvm_lowest_bit(_context, bits):
+    def codegen(_context, builder, _signature, args):
+        return builder.cttz(args[0], _true())
+
+    return types.int64(bits), codegen
+
+
+def _true():  # the count for zero is left undefined
+    from llvmlite import ir
+
+    return ir.Constant(ir.IntType(1), 1)
+
+
+@overload(lowest_bit)
+def _lowest_bit(bits):
+    return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None
+
+
+@njit(cache=True, nogil=True)
+def round_to_int32(value):
+    """Float to int32: half to even, saturating, NaN to 0; returned as int64."""
+    if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
+        return np.int64(0)
+    wide = min(max(np.float64(value), -2147483648.0), 2147483647.0)
+    return np.int64((wide + _ROUND) - _ROUND)
+
+
+@njit(cache=True, nogil=True)
+def round_to_uint32(value):
+    """Float to uint32: half to even, saturating, negative and NaN to 0; returned as int64."""
+    if not value > np.float32(0):
+        return np.int64(0)
+    wide = min(np.float64(value), 4294967295.0)
+    return np.int64((wide + _ROUND) - _ROUND)
+
+
+@njit(cache=True, nogil=True)
+def truncate_to_uint32(value):
+    """Float to uint32 towards zero, saturating, negative and NaN to 0; returned as int64."""
+    if not value > np.float32(0):
+        return np.int64(0)
+    return np.int64(min(np.float64(value), 4294967295.0))
+
+
+@njit(cache=True, nogil=True)
+def wrap_int32(value):
+    """Low 32 bits as a signed number."""
+    return ((value + 2147483648) & 4294967295) - 2147483648
+
+
+@njit(cache=True, nogil=True)
+def float_bits(value):
+    """Bits of a float32 as a signed number."""
+    return np.int64(np.float32(value).view(np.int32))
+
+
+@njit(cache=True, nogil=True)
+def biased_exponent(value):
+    """Exponent field of a float32; 0 for anything negative."""
+    return max(float_bits(value), 0) >> 23
