@@ -91,46 +91,38 @@ def add_requests(addresses: Any, lanes: int, merge: int, base: int, chunks: Any)
     chunks : ndarray, (chunks,), int64
         Requests so far; added to.
     """
+    served = 0  # bit i: lane i
     for i in range(lanes):
-        if addresses[i] < 0:
+        if addresses[i] < 0 or (served >> i) & 1:
             continue
-        sector = addresses[i] // SECTOR_BYTES
         busiest = 1
         if merge == SECTOR:
-            if _seen(addresses, i, sector):
-                continue
-            busiest = _busiest(addresses, i, lanes, sector)
-        chunks[(addresses[i] - base) // CHUNK_BYTES] += busiest
+            served, busiest = _sector(addresses, i, lanes, served)
+        chunks[(addresses[i] - base) >> 5] += busiest
 
 
 @njit(cache=True, nogil=True)
 def _sector_requests(addresses: Any, lanes: int) -> int:
+    """Sum, over the sectors touched, the lanes at their most wanted address."""
     total = 0
+    served = 0
     for i in range(lanes):
-        sector = addresses[i] // SECTOR_BYTES
-        if addresses[i] >= 0 and not _seen(addresses, i, sector):
-            total += _busiest(addresses, i, lanes, sector)
+        if addresses[i] >= 0 and not (served >> i) & 1:
+            served, busiest = _sector(addresses, i, lanes, served)
+            total += busiest
     return total
 
 
 @njit(cache=True, nogil=True)
-def _seen(addresses: Any, end: int, sector: int) -> bool:
-    """Whether a lane before ``end`` is in the sector."""
-    for j in range(end):  # noqa: SIM110 - Numba compiles no generator in any()
-        if addresses[j] >= 0 and addresses[j] // SECTOR_BYTES == sector:
-            return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _busiest(addresses: Any, first: int, lanes: int, sector: int) -> int:
-    """Count the lanes at the most wanted address of the sector, from lane ``first`` on."""
-    most = 0
+def _sector(addresses: Any, first: int, lanes: int, served: int) -> tuple[int, int]:
+    """Mark the lanes in the sector of lane ``first`` as served; count those at its most wanted address."""
+    most = 1
     for i in range(first, lanes):
-        if addresses[i] >= 0 and addresses[i] // SECTOR_BYTES == sector:
+        if 0 <= (addresses[i] ^ addresses[first]) < SECTOR_BYTES:
+            served |= 1 << i
             same = 1
             for j in range(i + 1, lanes):
                 if addresses[j] == addresses[i]:
                     same += 1
             most = max(most, same)
-    return most
+    return served, most

@@ -80,16 +80,17 @@ def _segments(
     for i in range(first, end):
         if addresses[i] < 0 or (served >> (i - first)) & 1:
             continue
-        segment = addresses[i] // segment_bytes
         low = addresses[i]
-        high = addresses[i] + access_bytes
-        for j in range(i, end):
-            if addresses[j] >= 0 and addresses[j] // segment_bytes == segment:
+        high = low
+        for j in range(i + 1, end):
+            # two addresses are in one aligned segment when they differ only in the bits below its size;
+            # an inactive lane differs in the sign bit
+            if 0 <= (addresses[j] ^ addresses[i]) < segment_bytes:
                 served |= 1 << (j - first)
                 low = min(low, addresses[j])
-                high = max(high, addresses[j] + access_bytes)
+                high = max(high, addresses[j])
         count += 1
-        total += _shrunk(low, high, segment_bytes) if shrink else segment_bytes
+        total += _shrunk(low, high + access_bytes, segment_bytes) if shrink else segment_bytes
     return count, total
 
 
@@ -97,8 +98,8 @@ def _segments(
 def _shrunk(low: int, high: int, segment_bytes: int) -> int:
     """Bytes of the smallest aligned segment, down to 32 bytes, that still holds low..high-1."""
     size = segment_bytes
-    while size > SECTOR_BYTES and low // (size // 2) == (high - 1) // (size // 2):
-        size //= 2
+    while size > SECTOR_BYTES and (low ^ (high - 1)) < size >> 1:
+        size >>= 1
     return size
 
 
