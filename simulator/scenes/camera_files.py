@@ -1,0 +1,111 @@
+"""Read a camera from whatever a user gives: an object, a matrix, a dictionary, a file, the name of a view."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.errors import TilestampError
+from simulator.scenes.camera import Camera, LookAt, ModelToClip
+
+MATRIX_KEY = "model_to_clip"
+OPTIONAL_KEYS = ("fov_degrees", "near", "far")
+FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...} or {"position", "forward", "up", ...}'
+
+
+def read_camera(source: Any = None, views: Mapping[str, Camera] | None = None) -> Camera:
+    """Make a camera of anything that describes one.
+
+    Parameters
+    ----------
+    source : Camera, array-like of (4, 4), mapping, str, Path or None
+        A 4x4 matrix is model to clip space, row-major. A mapping has the key ``model_to_clip``, or ``eye, target, up,
+        fov_degrees, near, far``, or ``position, forward, up, fov_degrees, near, far``. A string is a view's name or
+        ``FILE.json``, ``FILE.json:KEY`` or ``FILE.json:KEY:INDEX``. None is the view ``default``.
+    views : mapping of str to Camera, optional
+        The scene's views.
+
+    Returns
+    -------
+    Camera
+
+    Raises
+    ------
+    TilestampError
+        Where nothing of the kind can be made of it; the sentence names the file, view or field.
+    """
+    if source is None:
+        source = "default"
+    if isinstance(source, (str, Path)):
+        return _by_name(str(source), views or {})
+    if isinstance(source, Mapping):
+        return _from_mapping(source)
+    if isinstance(source, (list, tuple, np.ndarray)):
+        return ModelToClip(source)
+    if isinstance(source, Camera):
+        return source
+    raise TilestampError(f"camera: a {type(source).__name__} is not a camera, a 4x4 matrix, a dictionary or a file name")
+
+
+def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:
+    if name in views:
+        return views[name]
+    path, dot_json, keys = name.partition(".json")
+    if not dot_json:
+        known = ", ".join(views) or "none"
+        raise TilestampError(f"camera {name!r}: no such view (this scene has: {known}) and not a .json file")
+    document = _load_json(Path(path + dot_json))
+    try:
+        for key in keys.split(":")[1:]:
+            document = _member(document, key)
+        return read_camera(document)
+    except TilestampError as error:
+        raise TilestampError(f"{name}: {error}") from None
+
+
+def _load_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TilestampError(f"{path}: the camera file cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise TilestampError(f"{path}: the camera file is not text") from None
+    except json.JSONDecodeError as error:
+        raise TilestampError(f"{path}:{error.lineno}: not JSON ({error.msg})") from None
+
+
+def _member(document: Any, key: str) -> Any:
+    """Give the member of a dictionary or list that a part of ``FILE.json:KEY:INDEX`` names."""
+    if isinstance(document, Mapping) and key in document:
+        return document[key]
+    if isinstance(document, list) and key.isdecimal() and int(key) < len(document):
+        return document[int(key)]
+    raise TilestampError(f"there is no {key!r} in it; {_what_there_is(document)}")
+
+
+def _what_there_is(document: Any) -> str:
+    if isinstance(document, Mapping):
+        return "it has " + ", ".join(map(str, document))
+    if isinstance(document, list):
+        return f"it is a list of {len(document)}"
+    return f"it is {document!r}"
+
+
+def _from_mapping(fields: Mapping[str, Any]) -> Camera:
+    if MATRIX_KEY in fields:
+        return ModelToClip(fields[MATRIX_KEY])
+    options = {key: fields[key] for key in ("up", *OPTIONAL_KEYS) if key in fields}
+    if "eye" in fields and "target" in fields:
+        return LookAt(fields["eye"], fields["target"], **options)
+    if "position" in fields and "forward" in fields:
+        position, forward = fields["position"], fields["forward"]
+        try:
+            target = np.add(position, forward, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TilestampError("camera: position and forward need 3 numbers each") from None
+        return LookAt(position, target, **options)
+    raise TilestampError(f"camera: needs one of the forms {FORMS}; {_what_there_is(fields)}")
