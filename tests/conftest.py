@@ -1,7 +1,5 @@
 """What every test may ask for: the folder of real scenes and measurements that lies beside the project."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

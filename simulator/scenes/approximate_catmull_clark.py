@@ -8,8 +8,6 @@ patches, which hide that jump in the shading, are not built). A cage with other 
 Boundaries: the boundary curve is the cubic B-spline of its vertices, and a corner is interpolated (see `quad_cage`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,12 +65,13 @@ def _interior_points(cage: Cage) -> Points:
 
 
 def _edge_end(cage: Cage, corner: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number of the end of the edge that starts at a corner, as seen from the corner in question.
+    """Give the number of the end of the edge that starts at a corner, as seen from the corner in question.
 
     Two numbers an edge. ``corner`` is, for each corner, itself (the edge ahead) or the one before (the edge behind).
     """
     edge = cage.edge_of_corner[corner]
-    return 2 * edge + (cage.edges[edge, 1] == cage.corners)
+    number: NDArray[np.int64] = 2 * edge + (cage.edges[edge, 1] == cage.corners)
+    return number
 
 
 def _edge_points(cage: Cage, interior: Points, previous: NDArray[np.int64]) -> Points:

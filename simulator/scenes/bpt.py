@@ -4,8 +4,6 @@ Line 1 the patch count n; n lines of 16 comma-separated 1-based point numbers (4
 that many lines ``x,y,z``, or ``x,y,z,w`` for rational points with their weight last.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -102,10 +100,14 @@ class _Lines:
         """Take ``rows`` lines of comma-separated numbers, all of one of the ``widths``."""
         start, stop = self.next_line, self.next_line + rows
         if stop > len(self.lines):
-            raise self.error(len(self.lines), f"the file ends after {len(self.lines) - start} of {rows} lines of {what}")
+            raise self.error(
+                len(self.lines), f"the file ends after {len(self.lines) - start} of {rows} lines of {what}"
+            )
         self.next_line = stop
         try:
-            table = np.loadtxt(self.lines[start:stop], dtype=dtype, delimiter=",", comments=None, ndmin=2)
+            table: NDArray[np.float64] = np.loadtxt(
+                self.lines[start:stop], dtype=dtype, delimiter=",", comments=None, ndmin=2
+            )
         except ValueError:
             raise self._broken(start, stop, widths, dtype, what) from None
         if table.shape[0] != rows or table.shape[1] not in widths:

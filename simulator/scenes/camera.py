@@ -3,8 +3,6 @@
 Clip space is OpenGL's: a point is visible where -w <= x, y, z <= w; column vectors, row-major arrays, y up.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Read a camera from whatever a user gives: an object, a matrix, a dictionary, a file, the name of a view."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -48,7 +46,9 @@ def read_camera(source: Any = None, views: Mapping[str, Camera] | None = None) -
         return ModelToClip(source)
     if isinstance(source, Camera):
         return source
-    raise TilestampError(f"camera: a {type(source).__name__} is not a camera, a 4x4 matrix, a dictionary or a file name")
+    raise TilestampError(
+        f"camera: a {type(source).__name__} is not a camera, a 4x4 matrix, a dictionary or a file name"
+    )
 
 
 def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:

@@ -4,8 +4,6 @@ Read are ``v`` (with vertex colours where there are six numbers), ``f``, ``usemt
 ``Kd``, ``d`` of material files; texture coordinates, normals, groups, curves and everything else are passed over.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -147,7 +145,8 @@ def _base_colors(path: Path, reading: _Reading) -> NDArray[np.float64]:
             elif current >= 0 and words[:1] in (["Kd"], ["d"]):
                 values = _material_numbers(words, f"{file}:{number}")
                 colors[current, slice(0, 3) if words[0] == "Kd" else slice(3, 4)] = values
-    return np.clip(colors, 0.0, 1.0)
+    clipped: NDArray[np.float64] = np.clip(colors, 0.0, 1.0)
+    return clipped
 
 
 def _material_numbers(words: list[str], place: str) -> list[float]:

@@ -1,10 +1,8 @@
 """A cage: the polygons that a subdivision surface is modelled with, and one step of Catmull and Clark's refinement.
 
-Boundaries follow the usual rules: the boundary is refined as a cubic B-spline curve of its own, and a corner (a boundary
-vertex of one face only, or one where other than two boundary edges meet) stays where it is.
+Boundaries follow the usual rules: the boundary is refined as a cubic B-spline curve of its own, and a corner (a
+boundary vertex of one face only, or one where other than two boundary edges meet) stays where it is.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
-from simulator.scenes.obj_file import read_obj
+from simulator.scenes.obj_file import ObjFile, read_obj
 
 Indices = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -72,7 +70,8 @@ class Cage:
     @cached_property
     def boundary_edges(self) -> NDArray[np.bool_]:
         """Edges that are not between exactly two faces, (E,): the surface ends, or is creased, there."""
-        return self._edge_table[2] != 2
+        boundary: NDArray[np.bool_] = self._edge_table[2] != 2
+        return boundary
 
     @cached_property
     def faces_at_vertex(self) -> Indices:
@@ -88,7 +87,8 @@ class Cage:
     def sharp_vertices(self) -> NDArray[np.bool_]:
         """Boundary vertices that the surface passes through, (V,)."""
         on_boundary = self.boundary_at_vertex > 0
-        return on_boundary & ((self.faces_at_vertex == 1) | (self.boundary_at_vertex != 2))
+        sharp: NDArray[np.bool_] = on_boundary & ((self.faces_at_vertex == 1) | (self.boundary_at_vertex != 2))
+        return sharp
 
     def sum_at_boundary_neighbours(self) -> Points:
         """Sum of the neighbours along boundary edges of each vertex, (V, 3)."""
@@ -98,15 +98,19 @@ class Cage:
         )
 
 
-def read_cage(path: str | Path) -> Cage:
-    """Read the polygons of an OBJ file; raises TilestampError where a line is broken (``file:line``)."""
-    model = read_obj(path)
+def cage_of(model: ObjFile, path: str | Path) -> Cage:
+    """Make a cage of an OBJ file's polygons; raises TilestampError where one is folded onto itself."""
     cage = Cage(model.positions, model.corners, model.sizes)
     folded = cage.corners == cage.corners[cage.next_corner]
     if folded.any():
         face = int(cage.face_of_corner[folded.argmax()])
         raise TilestampError(f"{path}: face {face + 1} names the same vertex twice in a row, so it is no polygon")
     return cage
+
+
+def read_cage(path: str | Path) -> Cage:
+    """Read the polygons of an OBJ file; raises TilestampError where a line is broken (``file:line``)."""
+    return cage_of(read_obj(path), path)
 
 
 def refine(cage: Cage) -> Cage:
@@ -141,7 +145,7 @@ def scatter_sum(targets: Indices, values: Points, length: int) -> Points:
 
 
 def _moved_vertices(cage: Cage, faces: Points, middles: Points) -> Points:
-    """The vertex rule (F + 2 R + (n - 3) P) / n inside, (1, 6, 1) / 8 on the boundary, none at a corner."""
+    """Apply the vertex rule (F + 2 R + (n - 3) P) / n inside, (1, 6, 1) / 8 on the boundary, none at a corner."""
     count = len(cage.positions)
     valence = np.maximum(cage.faces_at_vertex, 1)[:, None]  # a vertex without a face goes nowhere
     around = scatter_sum(cage.corners, faces[cage.face_of_corner], count) / valence

@@ -1,16 +1,13 @@
 """A scene: patches or triangles, and the cameras that they are known by."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from simulator.scenes.camera import Camera
+from models.errors import TilestampError
+from simulator.scenes.camera import Camera
 
 
 @dataclass(frozen=True)
@@ -21,9 +18,20 @@ class Patches:
     ----------
     points : ndarray, (P, 16, 4), float32
         Homogeneous control points (wx, wy, wz, w), point 4 * row + column; u runs along the columns, v along the rows.
+        All are finite and every w is positive: anything else is refused.
     """
 
     points: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        if self.points.ndim != 3 or self.points.shape[1:] != (16, 4) or not len(self.points):
+            raise TilestampError(f"patches: control points must be (P, 16, 4), not {self.points.shape}")
+        broken = ~np.isfinite(self.points).all(axis=(1, 2))
+        if broken.any():
+            raise TilestampError(f"patches: patch {int(broken.argmax())} has a control point that is NaN or infinite")
+        light = (self.points[:, :, 3] <= 0.0).any(axis=1)
+        if light.any():
+            raise TilestampError(f"patches: patch {int(light.argmax())} has a weight that is not positive")
 
 
 @dataclass(frozen=True)
@@ -56,3 +64,21 @@ class Scene:
     mesh: Mesh | None = None
     views: Mapping[str, Camera] = field(default_factory=dict)
     note: str = ""  # says so where the scene is a stand-in
+
+    @classmethod
+    def from_clip_space(cls, positions: ArrayLike, triangles: ArrayLike, name: str = "clip-space mesh") -> "Scene":
+        """Make a scene of clip-space positions (V, 4) and triangles (F, 3), which go straight to triangle setup.
+
+        Raises TilestampError where positions are not finite, triangles name vertices that do not exist, or are none.
+        """
+        from simulator.scenes.triangle_mesh import clip_space_mesh, clip_space_scene
+
+        return clip_space_scene(clip_space_mesh(positions, triangles, name), name)
+
+    @classmethod
+    def sweep(cls, area: float, width: int = 1024, height: int = 768, seed: int = 0) -> "Scene":
+        """Make the synthetic triangles of one area, in pixels, of Figure 5 (Laine & Karras 2011); see `sweep`."""
+        from simulator.scenes.sweep import sweep_mesh
+        from simulator.scenes.triangle_mesh import clip_space_scene
+
+        return clip_space_scene(sweep_mesh(area, width, height, seed), f"sweep {area:g} px")

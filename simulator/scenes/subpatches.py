@@ -1,7 +1,5 @@
 """Cut patches into smaller patches, and into triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,9 +39,7 @@ def tessellate(patches: Patches, cells: int) -> Mesh:
     """
     t = np.linspace(0.0, 1.0, cells + 1)[:, None]
     powers = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
-    slopes = np.concatenate(
-        [-3 * (1 - t) ** 2, 3 * (1 - t) * (1 - 3 * t), 3 * t * (2 - 3 * t), 3 * t * t], axis=1
-    )
+    slopes = np.concatenate([-3 * (1 - t) ** 2, 3 * (1 - t) * (1 - 3 * t), 3 * t * (2 - 3 * t), 3 * t * t], axis=1)
     nets = patches.points.astype(np.float64).reshape(-1, 4, 4, 4)
     points, along_u, along_v = (
         np.einsum("ri,cj,pijk->prck", rows, columns, nets, optimize=True)
@@ -67,7 +63,9 @@ def tessellate(patches: Patches, cells: int) -> Mesh:
 def _split(nets: Nets, parts: NDArray[np.int64]) -> Nets:
     """Cut each patch into 1, 2 (along u) or 4 parts (u first), in place."""
     first, second = (np.einsum("ij,prjk->prik", half, nets) for half in (FIRST_HALF, SECOND_HALF))
-    quarters = [np.einsum("ij,pjck->pick", half, side) for half in (FIRST_HALF, SECOND_HALF) for side in (first, second)]
+    quarters = [
+        np.einsum("ij,pjck->pick", half, side) for half in (FIRST_HALF, SECOND_HALF) for side in (first, second)
+    ]
     pieces = np.stack(quarters, axis=1)
     pieces[parts == 1, 0] = nets[parts == 1]
     pieces[parts == 2, 0], pieces[parts == 2, 1] = first[parts == 2], second[parts == 2]

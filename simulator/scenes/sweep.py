@@ -3,10 +3,8 @@
 Layers of a triangular grid, each rotated and moved at random, cover the viewport; where triangles are small a layer
 keeps only patches of 8x8 quads, spaced so that at least 16 layers are drawn. Everything is float32 as in the authors'
 benchmark; the random numbers are theirs too (`xorshift`). The order of the two draws of a translation was left to their
-compiler: here the first goes to y (so does the last colour component get the first draw), and no statistic depends on it.
+compiler: here the first goes to y (and of a colour the first to the last component); no statistic depends on it.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -117,9 +115,9 @@ def _grid_to_ndc(size: float, mirror: float, width: int, height: int, step: int,
     shear = np.array([[1, 0.5, 0], [0, np.sqrt(f32(0.75)), 0], [0, 0, unit]], dtype=np.float32)
     rotate = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], dtype=np.float32)
     scale = np.diag(np.array([f32(2.0) * np.sqrt(f32(size)) / f32(side) for side in (width, height)] + [f32(1.0)]))
-    matrix: Floats = scale @ rotate @ shear @ move
+    matrix = scale @ rotate @ shear @ move
     matrix[:, 0] *= f32(mirror)
-    return matrix
+    return matrix.astype(np.float32)
 
 
 def _transform(matrix: Floats, origins: NDArray[np.int64], offsets: NDArray[np.int64]) -> Floats:
@@ -131,12 +129,12 @@ def _transform(matrix: Floats, origins: NDArray[np.int64], offsets: NDArray[np.i
 
 
 def _triangles(vertices: Floats) -> NDArray[np.int32]:
-    """The triangles of all patches whose three vertices are inside the viewport, in the original's order."""
+    """List the triangles of all patches whose three vertices are inside the viewport, in the original's order."""
     side = PATCH_QUADS + 1
     corner = np.arange(PATCH_QUADS)[:, None] * side + np.arange(PATCH_QUADS)
     v0, v1, v2, v3 = (corner + offset for offset in (0, 1, side, side + 1))
     pattern = np.stack([v0, v1, v2, v2, v1, v3], axis=-1).reshape(-1, 3)
-    inside = (np.abs(vertices[:, :, :2]) <= f32(1.0)).all(axis=2)
+    inside: NDArray[np.bool_] = (np.abs(vertices[:, :, :2]) <= f32(1.0)).all(axis=2)
     kept = inside[:, pattern[:, 0]] & inside[:, pattern[:, 1]] & inside[:, pattern[:, 2]]
     patch, triangle = np.nonzero(kept)
     numbers = pattern.astype(np.int32)[triangle]

@@ -3,8 +3,6 @@
 Specification: notes on Laine & Karras 2011, section 8. Draw n is rotl32(x[n-11] + x[n-7], 13).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ AUTHORS_SEED = 123
 
 
 @njit(cache=True, nogil=True)
-def _draw(state, numbers):  # noqa: ANN001, ANN202 (a kernel)
+def _draw(state: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> None:
     """Fill ``numbers`` with the next draws, in place."""
     place = state[WORDS]
     for i in range(numbers.size):

@@ -1,0 +1,179 @@
+"""Scenes by name: the embedded ones, those on the search path, files, and stand-ins for models that cannot ship."""
+
+import importlib
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.errors import TilestampError
+from simulator.scenes.approximate_catmull_clark import patches_from_cage
+from simulator.scenes.bpt import read_bpt
+from simulator.scenes.camera import Camera, fit_camera
+from simulator.scenes.obj_file import read_obj
+from simulator.scenes.quad_cage import cage_of
+from simulator.scenes.scene import Scene
+from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
+from simulator.scenes.subpatches import split_to_count, tessellate
+from simulator.scenes.triangle_mesh import clip_space_scene, mesh_from_obj, read_clip_space, read_mesh
+
+Kind = Literal["patches", "mesh"] | None
+
+DATA = Path(__file__).parent / "data"
+EMBEDDED = {
+    "teapot": ("teapot.bpt", "Newell's teapot, 32 patches (embedded)"),
+    "spot": ("spot_control_mesh.obj", "Keenan Crane's cow, a Catmull-Clark cage of 732 patches (embedded)"),
+}
+# Models of the papers that are not shipped: patches, and what they are.
+NOT_SHIPPED = {
+    "bigguy": (3570, "Bay Raitt's big guy, 3570 patches"),
+    "killeroo": (11532, "headus's killeroo, 11532 patches"),
+}
+Z_UP = ("teapot", "teacup", "teaspoon")  # Newell's models; all others are taken to have y up
+MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
+FINEST_TESSELLATION = 16  # quads along a patch
+
+
+def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: Kind = None) -> Scene:
+    """Load a scene by name or from a file.
+
+    Parameters
+    ----------
+    source : str, Path or Scene
+        The name of an embedded scene, a file, or the stem or name of a file on the search path. A Scene is given back.
+    scene_path : str, Path or sequence of them, optional
+        Folders to look in, before those of the environment variable TILESTAMP_SCENES; two levels of sub-folders count.
+    kind : {"patches", "mesh"}, optional
+        What to make of the file. By default patch files give patches, meshes a mesh, and an OBJ file of mostly quads
+        gives both: patches by `approximate_catmull_clark`, and its polygons as a mesh.
+
+    Returns
+    -------
+    Scene
+        With the model's named views, ``default`` among them.
+
+    Raises
+    ------
+    TilestampError
+        Where nothing of the name is found (the sentence says where the file goes) or the file is broken.
+    """
+    if isinstance(source, Scene):
+        return source
+    path = _resolve(source, scene_path)
+    name = str(source) if source in EMBEDDED else path.stem
+    return with_views(_read(name, path, kind))
+
+
+def list_scenes(scene_path: SearchPath = None) -> list[tuple[str, str]]:
+    """List the scenes that can be loaded by name, each with one line of what it is."""
+    lines = {name: line for name, (_, line) in EMBEDDED.items()}
+    for path in scene_files(scene_path):
+        known = NOT_SHIPPED.get(path.stem, (0, ""))[1] if path.suffix == ".bpt" else ""
+        lines.setdefault(path.stem, f"{known or path.suffix[1:] + ' file'} ({path})")
+    for name, (_, line) in NOT_SHIPPED.items():
+        lines.setdefault(name, f"{line}: not here; put {name}.bpt on the scene search path (TILESTAMP_SCENES)")
+    return list(lines.items())
+
+
+def stand_in(name: str) -> Scene:
+    """Give as many patches as a model that is not here has, cut from the embedded cage; its note says so."""
+    if name not in NOT_SHIPPED:
+        raise TilestampError(f"there is no stand-in for {name!r}, only for {' and '.join(NOT_SHIPPED)}")
+    count, line = NOT_SHIPPED[name]
+    cow = load_scene("spot")
+    if cow.patches is None:
+        raise TilestampError("the embedded cage is damaged: reinstall")
+    note = (
+        f"stand-in: {count} patches cut from the embedded spot, because {name} ({line}) is not here;"
+        f" put {name}.bpt on the scene search path (TILESTAMP_SCENES)"
+    )
+    return replace(cow, name=name, patches=split_to_count(cow.patches, count), note=note)
+
+
+def scene_or_stand_in(name: str, scene_path: SearchPath = None) -> Scene:
+    """Load a scene, or its stand-in where its file is missing."""
+    if name in NOT_SHIPPED and find_scene(name, scene_path) is None:
+        return stand_in(name)
+    return load_scene(name, scene_path)
+
+
+def with_mesh(scene: Scene) -> Scene:
+    """Give a scene that has a mesh: its patches cut into triangles, where it has none of its own."""
+    if scene.mesh is not None:
+        return scene
+    if scene.patches is None:
+        raise TilestampError(f"scene {scene.name!r} has neither patches nor triangles")
+    cells = int(np.sqrt(MOST_TRIANGLES / (2 * len(scene.patches.points))))
+    return replace(scene, mesh=tessellate(scene.patches, min(max(cells, 1), FINEST_TESSELLATION)))
+
+
+def with_views(scene: Scene, up: ArrayLike | None = None) -> Scene:
+    """Give a scene the views known for its name, and a fitted ``default`` where they have none."""
+    views: dict[str, Camera] = {**_known_views(scene.name), **scene.views}
+    if "default" not in views:
+        axis = up if up is not None else (0.0, 0.0, 1.0) if scene.name in Z_UP else (0.0, 1.0, 0.0)
+        views["default"] = fit_camera(bounds(scene), axis)
+    return replace(scene, views=views)
+
+
+def bounds(scene: Scene) -> NDArray[np.float64]:
+    """Box around all vertices and control points, (2, 3) float64."""
+    homogeneous = [scene.patches.points.reshape(-1, 4)] if scene.patches is not None else []
+    if scene.mesh is not None:
+        homogeneous.append(scene.mesh.positions[np.unique(scene.mesh.triangles)])
+    points = np.concatenate(homogeneous).astype(np.float64)
+    points = points[:, :3] / points[:, 3:]
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _known_views(name: str) -> Mapping[str, Camera]:
+    if importlib.util.find_spec("simulator.scenes.views") is None:
+        return {}
+    views: Mapping[str, Mapping[str, Camera]] = importlib.import_module("simulator.scenes.views").VIEWS
+    return views.get(name, {})
+
+
+def _resolve(source: str | Path, scene_path: SearchPath) -> Path:
+    if source in EMBEDDED:
+        return DATA / EMBEDDED[str(source)][0]
+    path = Path(source)
+    if path.is_file():
+        return path
+    found = find_scene(str(source), scene_path)
+    if found is None:
+        known = [name for name, _ in list_scenes(scene_path) if name not in NOT_SHIPPED or find_scene(name, scene_path)]
+        raise missing_scene(str(source), known, scene_path)
+    return found
+
+
+def _read(name: str, path: Path, kind: Kind) -> Scene:
+    if kind not in (None, "patches", "mesh"):
+        raise TilestampError(f"kind must be 'patches' or 'mesh', not {kind!r}")
+    suffix = path.suffix.lower()
+    if suffix == ".obj":
+        scene = _from_obj(name, path, kind)
+    elif suffix == ".bpt":
+        scene = Scene(name, patches=read_bpt(path))
+    elif kind == "patches":
+        raise TilestampError(f"{path}: only .bpt and .obj files can give patches")
+    elif suffix == ".npz":
+        scene = clip_space_scene(read_clip_space(path), name)
+    else:
+        scene = Scene(name, mesh=read_mesh(path))
+    return replace(with_mesh(scene), patches=None) if kind == "mesh" else scene
+
+
+def _from_obj(name: str, path: Path, kind: Kind) -> Scene:
+    """Patches of a cage, the mesh of its polygons, or both; of an embedded cage the surface only."""
+    model = read_obj(path)
+    if kind == "patches" or path.parent == DATA:
+        return Scene(name, patches=patches_from_cage(cage_of(model, path)))
+    mesh = mesh_from_obj(model, path)
+    mostly_quads = 2 * int((model.sizes == 4).sum()) > len(model.sizes)
+    if kind == "mesh" or not mostly_quads:
+        return Scene(name, mesh=mesh)
+    return Scene(name, mesh=mesh, patches=patches_from_cage(cage_of(model, path)))

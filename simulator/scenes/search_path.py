@@ -1,0 +1,53 @@
+"""Where scenes are looked for: a setting, and the environment variable TILESTAMP_SCENES."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from models.errors import TilestampError
+
+SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
+LEVELS = 2  # of sub-folders that are looked into
+# Where files of one stem differ in kind, the first of these wins: the paper's patches before a cage before triangles.
+SUFFIXES = (".bpt", ".obj", ".ply", ".glb", ".gltf", ".off", ".stl", ".npz")
+
+SearchPath = str | Path | Iterable[str | Path] | None
+
+
+def scene_folders(scene_path: SearchPath = None) -> list[Path]:
+    """Give the folders of the search path: the setting's first, then those of the environment."""
+    if scene_path is None:
+        scene_path = ()
+    elif isinstance(scene_path, (str, Path)):
+        scene_path = str(scene_path).split(os.pathsep)
+    places = [*scene_path, *os.environ.get(SCENES_VARIABLE, "").split(os.pathsep)]
+    return [Path(place) for place in places if str(place)]
+
+
+def scene_files(scene_path: SearchPath = None) -> list[Path]:
+    """List the files of the search path that can be scenes: folder by folder, preferred kinds first, then by name."""
+    found: dict[Path, None] = {}
+    for folder in scene_folders(scene_path):
+        for suffix in SUFFIXES:
+            for level in range(LEVELS + 1):
+                found.update(dict.fromkeys(sorted(folder.glob("*/" * level + "*" + suffix))))
+    return list(found)
+
+
+def find_scene(name: str, scene_path: SearchPath = None) -> Path | None:
+    """Find a file by its stem or its whole name on the search path, or None."""
+    for path in scene_files(scene_path):
+        if name in (path.stem, path.name):
+            return path
+    return None
+
+
+def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None) -> TilestampError:
+    """Say that a scene is missing and where its file goes."""
+    folders = ", ".join(map(str, scene_folders(scene_path)))
+    where = f"one of the folders {folders}" if folders else "a folder, and name that folder"
+    setting = "" if folders else f" in {SCENES_VARIABLE} (or --scene-path)"
+    return TilestampError(
+        f"scene {name!r} is neither a file nor known here ({', '.join(known)}):"
+        f" put {name}.bpt, .obj, .ply, .glb or .npz into {where}{setting}"
+    )

@@ -1,0 +1,207 @@
+"""Triangle meshes: files that trimesh reads, OBJ files with their polygons in order, clip-space arrays.
+
+Triangles keep the order of the file, degenerate and duplicate ones included: what to do with those is the rasterizer's
+business. Colours are taken as linear. Textures are not sampled: a textured material counts with its base colour.
+"""
+
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.errors import TilestampError
+from simulator.scenes.camera import ModelToClip
+from simulator.scenes.obj_file import WHITE, ObjFile
+from simulator.scenes.scene import Mesh, Scene
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read any mesh that trimesh reads: all parts of the file's (default) scene, placed by their nodes.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Mesh
+        Parts one after another; vertex colours, face colours (vertices are then not shared) or the materials' base
+        colours; the file's normals, or area-weighted ones.
+
+    Raises
+    ------
+    TilestampError
+        Where the file cannot be read, has no triangles, or holds NaN or vertex numbers that do not exist.
+    """
+    import trimesh
+
+    path = Path(path)
+    if not path.is_file():
+        raise TilestampError(f"{path}: there is no such file")
+    try:
+        loaded = trimesh.load_scene(path, process=False)
+        parts = [
+            (loaded.geometry[loaded.graph[node][1]], loaded.graph[node][0]) for node in loaded.graph.nodes_geometry
+        ]
+    except Exception as error:  # noqa: BLE001 (whatever a reader of broken bytes raises, the file is to blame)
+        raise TilestampError(f"{path}: cannot be read as a mesh ({type(error).__name__}: {error})") from None
+    meshes = [_part(part, matrix, path) for part, matrix in parts if len(getattr(part, "faces", ()))]
+    if not meshes:
+        raise TilestampError(f"{path}: has no faces, so there is nothing to rasterize")
+    return concatenate(meshes)
+
+
+def mesh_from_obj(model: ObjFile, path: str | Path) -> Mesh:
+    """Cut the polygons of an OBJ file into fans of triangles; base colours of materials (Kd, d) or vertex colours."""
+    first = np.cumsum(model.sizes) - model.sizes
+    fans = np.repeat(np.arange(len(model.sizes)), model.sizes - 2)
+    step = np.arange(len(fans)) - np.repeat(np.cumsum(model.sizes - 2) - (model.sizes - 2), model.sizes - 2)
+    start = first[fans]
+    triangles = np.stack([model.corners[start + offset] for offset in (0 * step, step + 1, step + 2)], axis=1)
+    if model.colors is not None:
+        colors = np.concatenate([model.colors, np.ones((len(model.colors), 1))], axis=1)
+        return model_mesh(model.positions, triangles, colors, None, path)
+    if not model.materials.any():
+        return model_mesh(model.positions, triangles, None, None, path)
+    # A vertex that several materials share becomes one vertex a material.
+    keys, numbers = np.unique(triangles * len(model.base_colors) + model.materials[fans][:, None], return_inverse=True)
+    vertex, material = np.divmod(keys, len(model.base_colors))
+    normals = vertex_normals(model.positions, triangles)[vertex]
+    triangles = numbers.reshape(-1, 3)
+    return model_mesh(model.positions[vertex], triangles, model.base_colors[material], normals, path)
+
+
+def read_clip_space(path: str | Path) -> Mesh:
+    """Read a `.npz` of ``positions`` (V, 4) float32 in clip space and ``triangles`` (F, 3) int32."""
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            members = {name: arrays[name] for name in arrays}
+    except FileNotFoundError:
+        raise TilestampError(f"{path}: there is no such file") from None
+    except (OSError, ValueError, AttributeError, EOFError, BadZipFile):
+        raise TilestampError(f"{path}: is not a .npz file of plain arrays") from None
+    for name in ("positions", "triangles"):
+        if name not in members:
+            raise TilestampError(f"{path}: has no array {name!r} (it has: {', '.join(members) or 'none'})")
+    return clip_space_mesh(members["positions"], members["triangles"], path)
+
+
+def clip_space_mesh(positions: ArrayLike, triangles: ArrayLike, source: str | Path = "clip-space mesh") -> Mesh:
+    """Make a mesh of clip-space vertices, for triangle setup as they are.
+
+    Parameters
+    ----------
+    positions : array-like, (V, 4)
+        Rounded to float32. w may be zero or negative: the pipelines do with it what their originals do.
+    triangles : array-like, (F, 3), integers
+    source : str or Path
+        What errors call it.
+    """
+    array = np.asarray(positions)
+    if array.ndim != 2 or array.shape[1] != 4 or array.dtype.kind not in "fiu":
+        raise TilestampError(f"{source}: positions must be (V, 4) numbers, not {array.shape} of {array.dtype}")
+    return Mesh(_finite(array, source), _indices(triangles, len(array), source), clip_space=True)
+
+
+def clip_space_scene(mesh: Mesh, name: str) -> Scene:
+    """Give a clip-space mesh as a scene; its only view leaves it where it is."""
+    return Scene(name, mesh=mesh, views={"default": ModelToClip(np.eye(4))})
+
+
+def model_mesh(
+    positions: Floats, triangles: ArrayLike, colors: Floats | None, normals: Floats | None, source: str | Path
+) -> Mesh:
+    """Make a mesh of model-space vertices (V, 3), checked; normals are made where there are none."""
+    indices = _indices(triangles, len(positions), source)
+    points = _finite(np.concatenate([positions, np.ones((len(positions), 1))], axis=1), source)
+    if normals is None or not np.isfinite(normals).all():
+        normals = vertex_normals(positions, indices)
+    return Mesh(points, indices, None if colors is None else colors.astype(np.float32), normals.astype(np.float32))
+
+
+def vertex_normals(positions: Floats, triangles: NDArray[Any]) -> Floats:
+    """Average unit normals at the vertices, weighted by the areas of the triangles around; zero where there are none."""
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    targets = triangles.reshape(-1)
+    sums = np.stack([np.bincount(targets, faces[:, axis], minlength=len(positions)) for axis in range(3)], axis=1)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    normals: Floats = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
+    return normals
+
+
+def concatenate(meshes: list[Mesh]) -> Mesh:
+    """Join meshes into one; a part without colours is white among parts with colours."""
+    starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
+    white = np.array(WHITE, dtype=np.float32)
+    colored = any(mesh.colors is not None for mesh in meshes)
+    colors = [np.tile(white, (len(m.positions), 1)) if m.colors is None else m.colors for m in meshes]
+    return Mesh(
+        positions=np.concatenate([mesh.positions for mesh in meshes]),
+        triangles=np.concatenate(
+            [m.triangles + start for m, start in zip(meshes, starts, strict=True)], dtype=np.int32
+        ),
+        colors=np.concatenate(colors) if colored else None,
+        normals=np.concatenate([mesh.normals for mesh in meshes if mesh.normals is not None]),
+    )
+
+
+def _part(part: Any, matrix: Floats, path: Path) -> Mesh:
+    """One geometry of a trimesh scene, placed by its node's matrix."""
+    positions, triangles = np.asarray(part.vertices, dtype=np.float64), np.asarray(part.faces)
+    _indices(triangles, len(positions), path)
+    colors, by_face = _colors(part)
+    normals = np.asarray(part.vertex_normals) if "vertex_normals" in part._cache else None  # noqa: SLF001 (trimesh's own test for normals from the file)
+    if by_face and colors is not None:
+        positions, colors = positions[triangles.reshape(-1)], np.repeat(colors, 3, axis=0)
+        normals = None if normals is None else normals[triangles.reshape(-1)]
+        triangles = np.arange(len(positions)).reshape(-1, 3)
+    linear = matrix[:3, :3]
+    if normals is not None and abs(np.linalg.det(linear)) > 0:
+        normals = normals @ np.linalg.inv(linear)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    return model_mesh(positions @ linear.T + matrix[:3, 3], triangles, colors, normals, path)
+
+
+def _colors(part: Any) -> tuple[Floats | None, bool]:
+    """RGBA in [0, 1] a vertex, or a face (then True); None where the file gives none."""
+    visual = part.visual
+    if visual.kind == "vertex":
+        return np.asarray(visual.vertex_colors) / 255.0, False
+    if visual.kind == "face":
+        return np.asarray(visual.face_colors) / 255.0, True
+    material = getattr(visual, "material", None)
+    if material is None:
+        return None, False
+    base = getattr(material, "baseColorFactor", None) if hasattr(material, "baseColorFactor") else material.main_color
+    color = np.array(WHITE) if base is None else np.asarray(base) / 255.0
+    return np.tile(color, (len(part.vertices), 1)), False
+
+
+def _indices(triangles: ArrayLike, vertices: int, source: str | Path) -> NDArray[np.int32]:
+    array = np.asarray(triangles)
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
+        raise TilestampError(f"{source}: triangles must be (F, 3) integers, not {array.shape} of {array.dtype}")
+    if not len(array):
+        raise TilestampError(f"{source}: has no triangles, so there is nothing to rasterize")
+    wrong = ((array < 0) | (array >= vertices)).any(axis=1)
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise TilestampError(
+            f"{source}: triangle {row} uses vertices {array[row].tolist()}, but there are {vertices} (from 0)"
+        )
+    return array.astype(np.int32)
+
+
+def _finite(positions: NDArray[Any], source: str | Path) -> NDArray[np.float32]:
+    with np.errstate(over="ignore"):
+        array = positions.astype(np.float32)
+    broken = ~np.isfinite(array).all(axis=1)
+    if broken.any():
+        raise TilestampError(f"{source}: vertex {int(broken.argmax())} is NaN, infinite or too large for float32")
+    return array
