@@ -1,6 +1,7 @@
 """What every test may ask for: the folder of real scenes and measurements that lies beside the project."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ def shared() -> Path:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _scene_search_path():
+def _scene_search_path() -> Iterator[None]:
     """Put the real scenes on the search path for the whole session, unless the caller has set one."""
     scenes = shared_folder() / "scenes"
     if not scenes.is_dir() or SCENES_VARIABLE in os.environ:

@@ -14,12 +14,13 @@ from models.errors import TilestampError
 from simulator.scenes.approximate_catmull_clark import patches_from_cage
 from simulator.scenes.bpt import read_bpt
 from simulator.scenes.camera import Camera, fit_camera
+from simulator.scenes.clip_space import clip_space_scene, read_clip_space
 from simulator.scenes.obj_file import read_obj
 from simulator.scenes.quad_cage import cage_of
 from simulator.scenes.scene import Scene
 from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from simulator.scenes.subpatches import split_to_count, tessellate
-from simulator.scenes.triangle_mesh import clip_space_scene, mesh_from_obj, read_clip_space, read_mesh
+from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
 
 Kind = Literal["patches", "mesh"] | None
 

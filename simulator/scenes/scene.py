@@ -46,6 +46,11 @@ class Mesh:
     colors : ndarray, (V, 4), float32, or None
         Linear RGBA in [0, 1] a vertex.
     normals : ndarray, (V, 3), float32, or None
+    uvs : ndarray, (V, 2), float32, or None
+        Texture coordinates, v from the top row down; they wrap outside [0, 1].
+    texture_ids : ndarray, (F,), int32, or None
+        Texture of each triangle, -1 where it has none.
+    textures : tuple of ndarray, (H, W, 4), uint8
     """
 
     positions: NDArray[np.float32]
@@ -53,6 +58,9 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     normals: NDArray[np.float32] | None = None
     clip_space: bool = False
+    uvs: NDArray[np.float32] | None = None
+    texture_ids: NDArray[np.int32] | None = None
+    textures: tuple[NDArray[np.uint8], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,14 +79,14 @@ class Scene:
 
         Raises TilestampError where positions are not finite, triangles name vertices that do not exist, or are none.
         """
-        from simulator.scenes.triangle_mesh import clip_space_mesh, clip_space_scene
+        from simulator.scenes.clip_space import clip_space_mesh, clip_space_scene
 
         return clip_space_scene(clip_space_mesh(positions, triangles, name), name)
 
     @classmethod
     def sweep(cls, area: float, width: int = 1024, height: int = 768, seed: int = 0) -> "Scene":
         """Make the synthetic triangles of one area, in pixels, of Figure 5 (Laine & Karras 2011); see `sweep`."""
+        from simulator.scenes.clip_space import clip_space_scene
         from simulator.scenes.sweep import sweep_mesh
-        from simulator.scenes.triangle_mesh import clip_space_scene
 
         return clip_space_scene(sweep_mesh(area, width, height, seed), f"sweep {area:g} px")

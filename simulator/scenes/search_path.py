@@ -46,7 +46,7 @@ def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None
     """Say that a scene is missing and where its file goes."""
     folders = ", ".join(map(str, scene_folders(scene_path)))
     where = f"one of the folders {folders}" if folders else "a folder, and name that folder"
-    setting = "" if folders else f" in {SCENES_VARIABLE} (or --scene-path)"
+    setting = "" if folders else f" in {SCENES_VARIABLE} (or the setting scene_path)"
     return TilestampError(
         f"scene {name!r} is neither a file nor known here ({', '.join(known)}):"
         f" put {name}.bpt, .obj, .ply, .glb or .npz into {where}{setting}"

@@ -1,4 +1,4 @@
-"""Triangle meshes: files that trimesh reads, OBJ files with their polygons in order, clip-space arrays.
+"""Triangle meshes: files that trimesh reads, and OBJ files with their polygons in order.
 
 Triangles keep the order of the file, degenerate and duplicate ones included: what to do with those is the rasterizer's
 business. Colours are taken as linear. Textures are not sampled: a textured material counts with its base colour.
@@ -6,15 +6,14 @@ business. Colours are taken as linear. Textures are not sampled: a textured mate
 
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from models.errors import TilestampError
-from simulator.scenes.camera import ModelToClip
+from simulator.scenes.clip_space import finite_positions, vertex_numbers
 from simulator.scenes.obj_file import WHITE, ObjFile
-from simulator.scenes.scene import Mesh, Scene
+from simulator.scenes.scene import Mesh
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -76,56 +75,19 @@ def mesh_from_obj(model: ObjFile, path: str | Path) -> Mesh:
     return model_mesh(model.positions[vertex], triangles, model.base_colors[material], normals, path)
 
 
-def read_clip_space(path: str | Path) -> Mesh:
-    """Read a `.npz` of ``positions`` (V, 4) float32 in clip space and ``triangles`` (F, 3) int32."""
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            members = {name: arrays[name] for name in arrays}
-    except FileNotFoundError:
-        raise TilestampError(f"{path}: there is no such file") from None
-    except (OSError, ValueError, AttributeError, EOFError, BadZipFile):
-        raise TilestampError(f"{path}: is not a .npz file of plain arrays") from None
-    for name in ("positions", "triangles"):
-        if name not in members:
-            raise TilestampError(f"{path}: has no array {name!r} (it has: {', '.join(members) or 'none'})")
-    return clip_space_mesh(members["positions"], members["triangles"], path)
-
-
-def clip_space_mesh(positions: ArrayLike, triangles: ArrayLike, source: str | Path = "clip-space mesh") -> Mesh:
-    """Make a mesh of clip-space vertices, for triangle setup as they are.
-
-    Parameters
-    ----------
-    positions : array-like, (V, 4)
-        Rounded to float32. w may be zero or negative: the pipelines do with it what their originals do.
-    triangles : array-like, (F, 3), integers
-    source : str or Path
-        What errors call it.
-    """
-    array = np.asarray(positions)
-    if array.ndim != 2 or array.shape[1] != 4 or array.dtype.kind not in "fiu":
-        raise TilestampError(f"{source}: positions must be (V, 4) numbers, not {array.shape} of {array.dtype}")
-    return Mesh(_finite(array, source), _indices(triangles, len(array), source), clip_space=True)
-
-
-def clip_space_scene(mesh: Mesh, name: str) -> Scene:
-    """Give a clip-space mesh as a scene; its only view leaves it where it is."""
-    return Scene(name, mesh=mesh, views={"default": ModelToClip(np.eye(4))})
-
-
 def model_mesh(
     positions: Floats, triangles: ArrayLike, colors: Floats | None, normals: Floats | None, source: str | Path
 ) -> Mesh:
     """Make a mesh of model-space vertices (V, 3), checked; normals are made where there are none."""
-    indices = _indices(triangles, len(positions), source)
-    points = _finite(np.concatenate([positions, np.ones((len(positions), 1))], axis=1), source)
+    indices = vertex_numbers(triangles, len(positions), source)
+    points = finite_positions(np.concatenate([positions, np.ones((len(positions), 1))], axis=1), source)
     if normals is None or not np.isfinite(normals).all():
         normals = vertex_normals(positions, indices)
     return Mesh(points, indices, None if colors is None else colors.astype(np.float32), normals.astype(np.float32))
 
 
 def vertex_normals(positions: Floats, triangles: NDArray[Any]) -> Floats:
-    """Average unit normals at the vertices, weighted by the areas of the triangles around; zero where there are none."""
+    """Average unit normals at the vertices, weighted by the areas of the triangles around; zero where none is."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     targets = triangles.reshape(-1)
@@ -154,7 +116,7 @@ def concatenate(meshes: list[Mesh]) -> Mesh:
 def _part(part: Any, matrix: Floats, path: Path) -> Mesh:
     """One geometry of a trimesh scene, placed by its node's matrix."""
     positions, triangles = np.asarray(part.vertices, dtype=np.float64), np.asarray(part.faces)
-    _indices(triangles, len(positions), path)
+    vertex_numbers(triangles, len(positions), path)
     colors, by_face = _colors(part)
     normals = np.asarray(part.vertex_normals) if "vertex_normals" in part._cache else None  # noqa: SLF001 (trimesh's own test for normals from the file)
     if by_face and colors is not None:
@@ -181,27 +143,3 @@ def _colors(part: Any) -> tuple[Floats | None, bool]:
     base = getattr(material, "baseColorFactor", None) if hasattr(material, "baseColorFactor") else material.main_color
     color = np.array(WHITE) if base is None else np.asarray(base) / 255.0
     return np.tile(color, (len(part.vertices), 1)), False
-
-
-def _indices(triangles: ArrayLike, vertices: int, source: str | Path) -> NDArray[np.int32]:
-    array = np.asarray(triangles)
-    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
-        raise TilestampError(f"{source}: triangles must be (F, 3) integers, not {array.shape} of {array.dtype}")
-    if not len(array):
-        raise TilestampError(f"{source}: has no triangles, so there is nothing to rasterize")
-    wrong = ((array < 0) | (array >= vertices)).any(axis=1)
-    if wrong.any():
-        row = int(wrong.argmax())
-        raise TilestampError(
-            f"{source}: triangle {row} uses vertices {array[row].tolist()}, but there are {vertices} (from 0)"
-        )
-    return array.astype(np.int32)
-
-
-def _finite(positions: NDArray[Any], source: str | Path) -> NDArray[np.float32]:
-    with np.errstate(over="ignore"):
-        array = positions.astype(np.float32)
-    broken = ~np.isfinite(array).all(axis=1)
-    if broken.any():
-        raise TilestampError(f"{source}: vertex {int(broken.argmax())} is NaN, infinite or too large for float32")
-    return array
