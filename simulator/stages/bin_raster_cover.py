@@ -1,0 +1,170 @@
+"""What bin and coarse raster share: triangles against squares, walked by a warp (Laine & Karras 2011, sections 4 and 5).
+
+Both stages ask the same question at two scales: which squares (bins of 2048, tiles of 128 sub-pixels) does a
+triangle touch? A lane owns a triangle, walks the squares of its box row by row, and sets its bit in the mask of
+every square that passes, by an OR in shared memory. The functions here work on one warp's triangles at a time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.coalescing import SECTOR_BYTES, SEGMENT_BYTES, transactions
+from models.errors import TilestampError
+from models.simt import Coalescing, Simt
+
+WARP_SECTORS = int(Coalescing.WARP_SECTORS)
+WARP = 32  # lanes; the original's ballots and its masks of 32 bits know no other width
+HEADER_BYTES = 16  # six int16 coordinates and one word
+BIN_SIDE_LOG2 = 11  # a bin is 128 pixels of 16 sub-pixels wide
+TILE_SIDE_LOG2 = 7  # a tile is 8 pixels wide
+SINGLE_TRIANGLE = 7  # low bits of a queue entry whose triangle has its data at its own slot
+
+
+class WarpBoxes(NamedTuple):
+    """The triangles of one warp, a row a lane: scratch space of a worker."""
+
+    slot: NDArray[np.int64]  # (32,) index of header and data
+    box: NDArray[np.int64]  # (32, 4) first column, first row, columns, rows of squares
+    edge: NDArray[np.int64]  # (32, 3) edge functions at the walk's square, largest over that closed square
+    step: NDArray[np.int64]  # (32, 6) dx0 dy0 dx1 dy1 dx2 dy2 times the square's side
+    bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank in the current instruction
+
+
+@njit(cache=True, nogil=True)
+def _new_boxes():
+    return WarpBoxes(
+        np.zeros(WARP, np.int64),
+        np.zeros((WARP, 4), np.int64),
+        np.zeros((WARP, 3), np.int64),
+        np.zeros((WARP, 6), np.int64),
+        np.zeros(WARP, np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _entry_slot(entry, misc):
+    """Slot of a queue entry: the triangle's own, or the sub-triangle's in the run that its header's word points to."""
+    part = entry & 7
+    if part == SINGLE_TRIANGLE:
+        return entry >> 3
+    return np.int64(misc[entry >> 3]) + part
+
+
+@njit(cache=True, nogil=True)
+def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
+    """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
+    x0, y0, x1, y1, x2, y2 = header[0] + dx, header[1] + dy, header[2] + dx, header[3] + dy, header[4] + dx, header[5] + dy
+    low_x = min(max(min(x0, x1, x2) >> shift, 0), last_x)
+    low_y = min(max(min(y0, y1, y2) >> shift, 0), last_y)
+    box = boxes.box[lane]
+    box[0], box[1] = low_x, low_y
+    box[2] = min(max(max(x0, x1, x2) >> shift, 0), last_x) - low_x + 1
+    box[3] = min(max(max(y0, y1, y2) >> shift, 0), last_y) - low_y + 1
+
+
+@njit(cache=True, nogil=True)
+def _lane_edges(boxes, lane, header, dx, dy, shift):
+    """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
+    side = np.int64(1) << shift
+    corner_x, corner_y = boxes.box[lane, 0] * side - dx, boxes.box[lane, 1] * side - dy
+    for k in range(3):
+        j = 2 * ((k + 1) % 3)
+        ax, ay = np.int64(header[2 * k]), np.int64(header[2 * k + 1])
+        ex, ey = header[j] - ax, header[j + 1] - ay
+        boxes.step[lane, 2 * k], boxes.step[lane, 2 * k + 1] = ex * side, ey * side
+        boxes.edge[lane, k] = (ax - corner_x) * ey - (ay - corner_y) * ex + side * (max(ex, 0) - min(ey, 0))
+
+
+@njit(cache=True, nogil=True)
+def _touches(boxes, lane, column, row):
+    """Whether the triangle touches the closed square (column, row) of its box: no edge has it wholly outside."""
+    for k in range(3):
+        if boxes.edge[lane, k] - column * boxes.step[lane, 2 * k + 1] + row * boxes.step[lane, 2 * k] < 0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _count_corner(boxes, lanes, stride, wide, high):
+    """Replays of the OR at one corner of all boxes (``wide``/``high``: of those two squares wide/high); -1: no lane."""
+    boxes.bank[:] = 0
+    deepest = 0
+    for lane in range(lanes):
+        box = boxes.box[lane]
+        if box[2] > wide and box[3] > high:
+            bank = (box[0] + wide + (box[1] + high) * stride) % WARP
+            boxes.bank[bank] += 1
+            deepest = max(deepest, boxes.bank[bank])
+    return deepest - 1
+
+
+@njit(cache=True, nogil=True)
+def _small_votes(boxes, lanes, stride):
+    """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one OR for each corner that any lane has."""
+    ors, replays = 0, 0
+    for corner in range(4):
+        deep = _count_corner(boxes, lanes, stride, corner & 1, corner >> 1)
+        if deep >= 0:
+            ors, replays = ors + 1, replays + deep
+    return ors, replays
+
+
+@njit(cache=True, nogil=True)
+def _walk_votes(boxes, lanes, steps, stride):
+    """Shared ORs of a warp whose lanes walk their own boxes with the edge test, and their replays."""
+    ors, replays = 0, 0
+    for step in range(steps):
+        boxes.bank[:] = 0
+        deepest = 0
+        for lane in range(lanes):
+            box = boxes.box[lane]
+            if step < box[2] * box[3]:
+                column, row = step % box[2], step // box[2]
+                if _touches(boxes, lane, column, row):
+                    bank = (box[0] + column + (box[1] + row) * stride) % WARP
+                    boxes.bank[bank] += 1
+                    deepest = max(deepest, boxes.bank[bank])
+        if deepest > 0:
+            ors, replays = ors + 1, replays + deepest - 1
+    return ors, replays
+
+
+@njit(cache=True, nogil=True)
+def _header_load(slot, lanes, rule, addresses):
+    """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane."""
+    segment, together = (SECTOR_BYTES, WARP) if rule == WARP_SECTORS else (SEGMENT_BYTES, WARP // 4)
+    distinct = 0
+    last = np.int64(-1)
+    for lane in range(lanes):
+        here = slot[lane] * HEADER_BYTES // segment
+        if lane % together == 0:
+            last = -1
+        if here < last:  # not in order: let the general rule look at every pair
+            for i in range(lanes):
+                addresses[i] = slot[i] * HEADER_BYTES
+            return transactions(addresses, lanes, HEADER_BYTES, rule)
+        distinct += here != last
+        last = here
+    return distinct, distinct * segment
+
+
+def check_machine(simt: Simt, stage: str) -> None:
+    """Refuse a machine that cannot run the original.
+
+    Parameters
+    ----------
+    simt : Simt
+        The machine's shape.
+    stage : str
+        Who asks, for the message.
+
+    Raises
+    ------
+    TilestampError
+        Where the machine has no ballots over warps of 32 (compute capability below 2.0).
+    """
+    if simt.warp != WARP or simt.coalescing == Coalescing.HALF_WARP_SEGMENTS:
+        raise TilestampError(f"{stage}: cudaraster votes over warps of 32 and needs compute capability 2.0 or later")
