@@ -1,0 +1,135 @@
+"""Catmull-Clark subdivision of any cage, to a level or to a size on screen (Catmull & Clark 1978; DeRose et al. 1998).
+
+A step makes one quad of each face corner. Who neighbours whom afterwards follows from the numbering alone, so nothing
+is searched for after the first look at the cage: the vertices of a step are the old vertices, a point an edge and a
+point a face; its edges are two halves of each old edge and a spoke from each edge point to each face point beside it.
+
+Boundaries are creases that never soften; a boundary vertex of one face stays where it is, as in ``quad_cage``.
+Handled: faces of any number of corners, isolated vertices (dropped), zero-area faces (they stay so), faces wound
+against their neighbours (turned round). Refused in a sentence: edges of three faces, faces of two corners or with a
+corner twice, one-sided surfaces.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.errors import TilestampError
+from simulator.scenes.catmull_clark_cage import check_cage, cleaned_cage, edge_sharpness
+from simulator.scenes.catmull_clark_step import limit_points, step
+from simulator.scenes.quad_cage import Cage
+
+MOST_FACES = 1 << 26  # 67 million quads: beyond it memory, not patience, runs out
+
+
+class Surface(NamedTuple):
+    """A polygon surface ready to be refined, and which face of the cage each polygon comes from.
+
+    Parameters
+    ----------
+    positions : ndarray, (V, 3), float64
+    offsets : ndarray, (F + 1,), int32
+        First corner of each face; all faces are quads after one step.
+    corners : ndarray, (C,), int32
+        Vertices of the faces.
+    corner_edges : ndarray, (C,), int32
+        The edge from each corner to the next.
+    edges : ndarray, (E, 2), int32
+    sharpness : ndarray, (E,), float32
+        Steps for which an edge stays a crease; infinite on boundaries.
+    cage_face : ndarray, (F,), int32
+    """
+
+    positions: NDArray[np.float64]
+    offsets: NDArray[np.int32]
+    corners: NDArray[np.int32]
+    corner_edges: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    sharpness: NDArray[np.float32]
+    cage_face: NDArray[np.int32]
+
+    @property
+    def quads(self) -> NDArray[np.int32]:
+        """Corners of the faces, (F, 4), once all are quads."""
+        return self.corners.reshape(-1, 4)
+
+
+def surface_of(cage: Cage, creases: ArrayLike = (), sharpness: ArrayLike = ()) -> Surface:
+    """Look at a cage once: its edges, boundaries and creases.
+
+    Parameters
+    ----------
+    cage : Cage
+    creases : array-like, (K, 2), int
+        Vertex pairs of the cage.
+    sharpness : array-like, (K,), float
+        Steps for which each crease holds; ``inf`` for ever.
+
+    Raises
+    ------
+    TilestampError
+        The cage is no surface (see the module), or a crease is no edge of it.
+    """
+    check_cage(cage)
+    clean, kept = cleaned_cage(cage)
+    sharp = edge_sharpness(clean, kept, np.asarray(creases, np.int64).reshape(-1, 2), np.asarray(sharpness, np.float32))
+    return Surface(
+        clean.positions,
+        np.concatenate([[0], np.cumsum(clean.sizes)]).astype(np.int32),
+        clean.corners.astype(np.int32),
+        clean.edge_of_corner.astype(np.int32),
+        clean.edges.astype(np.int32),
+        sharp,
+        np.arange(len(clean.sizes), dtype=np.int32),
+    )
+
+
+def subdivide(surface: Surface, levels: int) -> Surface:
+    """Refine ``levels`` times.
+
+    Raises
+    ------
+    TilestampError
+        More than ``MOST_FACES`` quads would come out, or ``levels`` is negative.
+    """
+    faces = len(surface.corners) * 4 ** max(levels - 1, 0)
+    if levels < 0 or faces > MOST_FACES:
+        raise TilestampError(f"subdivision to level {levels} would make {faces:,} quads; at most {MOST_FACES:,} fit")
+    for _ in range(levels):
+        surface = Surface(*step(*surface))
+    return surface
+
+
+def limit_positions(surface: Surface) -> NDArray[np.float64]:
+    """Where the vertices of a surface of quads end up after infinitely many steps, (V, 3) float64.
+
+    Exact for smooth vertices and for creases that hold for ever; a crease that softens later counts as one that holds.
+    """
+    if len(surface.corners) != 4 * len(surface.cage_face):
+        raise TilestampError("limit positions need quads: subdivide once first")
+    limits: NDArray[np.float64] = limit_points(surface.positions, surface.quads, surface.edges, surface.sharpness)
+    return limits
+
+
+def levels_for_area(surface: Surface, matrix: ArrayLike, width: int, height: int, area: float) -> int:
+    """Count the steps until no quad in view is larger than ``area`` pixels: a step quarters an area.
+
+    Counted from two steps on, where the quads have the surface's own shape.
+    """
+    refined = subdivide(surface, 2)
+    largest = _largest_area(refined, np.asarray(matrix, np.float64), width, height)
+    return 2 + max(0, int(np.ceil(np.log(max(largest, 1e-12) / area) / np.log(4.0))))
+
+
+def _largest_area(surface: Surface, matrix: NDArray[np.float64], width: int, height: int) -> float:
+    """Area in pixels of the largest quad with a corner on screen."""
+    clip = surface.positions @ matrix[:, :3].T + matrix[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        screen = clip[:, :2] / clip[:, 3:] * [width / 2.0, -height / 2.0] + [width / 2.0, height / 2.0]
+    inside = (clip[:, 3] > 0) & (screen >= 0).all(axis=1) & (screen < [width, height]).all(axis=1)
+    quads = screen[surface.quads]
+    across, along = quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]
+    areas = np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]) / 2.0
+    seen = inside[surface.quads].any(axis=1) & (clip[:, 3][surface.quads] > 0).all(axis=1)
+    return float(areas[seen].max(initial=0.0))
