@@ -1,0 +1,336 @@
+"""A machine: one GPU as numbers, each with its provenance.
+
+A machine file (``models/machines/NAME.toml``, or the user's own) has the sections below. Every number in it is
+written ``key = { value = 30, provenance = "published", source = "where from" }``; ``load_machine`` hands out plain
+numbers (``machine.sm.count``) and keeps where each came from in ``machine.provenance["sm.count"]``.
+Cycles are those of ``sm.clock_mhz``, the clock at which instructions issue (the shader clock up to Fermi).
+"""
+
+import difflib
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from models.errors import TilestampError
+from models.simt import AtomicMerge, Coalescing, Simt
+
+FOLDER = Path(__file__).parent / "machines"
+Provenance = Literal["published", "measured", "derived", "fitted", "assumed"]
+Count = Annotated[int, msgspec.Meta(ge=1)]
+Size = Annotated[int, msgspec.Meta(ge=0)]
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+Amount = Annotated[float, msgspec.Meta(ge=0)]
+
+
+class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the machine is."""
+
+    name: str
+    description: str
+    compute_capability: str
+
+
+class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A multiprocessor: schedulers, and what resident blocks share."""
+
+    count: Count
+    warp_size: Count
+    schedulers: Count
+    clock_mhz: Positive
+    max_warps: Count
+    max_threads: Count
+    max_blocks: Count
+    max_threads_per_block: Count
+    registers: Count
+    register_unit: Count  # registers are allotted in multiples of this
+    register_allocation: Literal["block", "warp"]  # to whom
+    warp_granularity: Count  # warps of a block are rounded up to a multiple of this
+    max_registers_per_thread: Count
+    shared_bytes: Size
+    shared_unit_bytes: Count
+    reserved_shared_bytes: Size  # that the system takes from every block
+
+
+class Issue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Cycles for which one warp instruction holds its scheduler, by class."""
+
+    fp32: Amount
+    int32: Amount
+    mul32: Amount
+    sfu: Amount
+    control: Amount
+    shared: Amount
+    load: Amount
+    store: Amount
+    atomic: Amount
+    shared_atomic: Amount
+    barrier: Amount
+
+
+class Pipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Cycles for which one warp instruction holds the execution unit behind its scheduler; 0: never longer than issue.
+
+    The units work side by side, so the fullest one counts: fp32, int32 with control, mul32, sfu.
+    """
+
+    fp32: Amount
+    int32: Amount
+    mul32: Amount
+    sfu: Amount
+    control: Amount
+
+
+class Latency(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Cycles that a dependent instruction waits."""
+
+    alu_cycles: Positive
+    shared_cycles: Positive
+    l2_cycles: Amount  # 0 where there is no L2 for data
+    dram_cycles: Positive
+    atomic_cycles: Positive
+    barrier_cycles: Amount
+    block_launch_cycles: Amount  # from a free place on the SM to the first instruction of the block put there
+
+
+class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Widths and sizes of the memory system."""
+
+    coalescing: Literal["half_warp_segments", "warp_lines", "warp_sectors"]
+    dram_gb_per_s: Positive
+    dram_efficiency: Annotated[float, msgspec.Meta(gt=0, le=1)]  # best sustained share of dram_gb_per_s
+    l2_bytes: Size  # 0: no cache between the SMs and DRAM
+    l2_line_bytes: Count
+    l2_bytes_per_clock: Amount  # all SMs together
+    l1_bytes_per_clock: Positive  # global loads and stores of one SM
+    banks: Count
+    bank_lanes: Count
+    bank_pass_cycles: Positive  # one pass of one group of bank_lanes
+
+
+class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where global atomics are performed, and how fast."""
+
+    place: Literal["dram_lock", "l2_unit"]
+    merge: Literal["none", "sector"]
+    unit_bytes: Count  # consecutive bytes that one lock or unit owns
+    units: Size  # units that the addresses are dealt to; 0: each stretch of unit_bytes has its own
+    unit_ns_per_request: Amount  # for which the unit is held
+    requests_per_clock: Positive  # all units together, at different addresses
+    conflict_ns: Amount  # further time of the whole memory system for a lane that an earlier lane of its warp blocks
+
+
+class Launching(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a launch costs besides its work."""
+
+    kernel_us: Amount  # of a kernel's own duration
+    stream_us: Amount  # from one empty kernel to the next in a stream
+    graph_us: Amount  # the same in a graph; stream_us where there are no graphs
+    sync_us: Amount  # launch and wait for the result
+    blocks_per_us: Positive
+
+
+class FixedFunction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The fixed-function pipe: what each unit does in a clock, all copies of it together."""
+
+    clock_mhz: Positive
+    per_clock: dict[str, Positive]
+
+
+class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One GPU."""
+
+    identity: Identity
+    sm: Sm
+    issue: Issue
+    pipe: Pipe
+    latency: Latency
+    memory: Memory
+    atomics: Atomics
+    launch: Launching
+    fixed_function: FixedFunction | None
+    provenance: dict[str, tuple[Provenance, str]]  # "sm.count" -> kind, source
+    digest: str  # of the numbers, for manifests
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return self.identity.name
+
+    @property
+    def simt(self) -> Simt:
+        """The part that counting depends on."""
+        return Simt(
+            warp=self.sm.warp_size,
+            coalescing=int(Coalescing[self.memory.coalescing.upper()]),
+            banks=self.memory.banks,
+            bank_lanes=self.memory.bank_lanes,
+            atomic_merge=int(AtomicMerge[self.atomics.merge.upper()]),
+            sms=self.sm.count,
+        )
+
+    @property
+    def clock_hz(self) -> float:
+        """Issue clock in Hz."""
+        return self.sm.clock_mhz * 1e6
+
+    @property
+    def dram_bytes_per_cycle(self) -> float:
+        """Sustained DRAM bytes in a cycle of the issue clock."""
+        return self.memory.dram_gb_per_s * 1e9 * self.memory.dram_efficiency / self.clock_hz
+
+
+SECTIONS: dict[str, type[msgspec.Struct]] = {
+    "identity": Identity,
+    "sm": Sm,
+    "issue": Issue,
+    "pipe": Pipe,
+    "latency": Latency,
+    "memory": Memory,
+    "atomics": Atomics,
+    "launch": Launching,
+    "fixed_function": FixedFunction,
+}
+
+
+def list_machines() -> dict[str, str]:
+    """Machines that come with the package: name and a line of what each is."""
+    files = sorted(FOLDER.glob("*.toml"))
+    return {file.stem: tomllib.loads(file.read_text("utf-8"))["identity"]["description"] for file in files}
+
+
+def load_machine(name_or_path: str | Path) -> Machine:
+    """Read a machine by its name, or from a file of the user's.
+
+    Raises
+    ------
+    TilestampError
+        No such machine or file; a key that is unknown, missing or out of range; numbers that contradict each other.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = FOLDER / f"{name_or_path}.toml"
+        if not path.is_file():
+            known = list(list_machines())
+            raise TilestampError(
+                f"no machine {str(name_or_path)!r}{_nearest(str(name_or_path), known)}; known: {', '.join(known)}"
+            )
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise TilestampError(f"cannot read the machine file {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise TilestampError(f"{path} is not a TOML file: {error}") from error
+    return _build(table, str(path))
+
+
+def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance, source: str) -> Machine:
+    """Return the machine with other numbers: a what-if, or a fit.
+
+    Parameters
+    ----------
+    machine : Machine
+    values : mapping
+        Such as ``{"sm.clock_mhz": 1500.0}``.
+    provenance, source : str
+        What the new numbers are, and where they come from.
+    """
+    table = msgspec.to_builtins(machine)
+    for key, value in values.items():
+        *path, last = key.split(".")
+        section = table
+        for step in path:
+            section = section.get(step) or {}
+        if last not in section:
+            raise TilestampError(f"{key!r} is no number of a machine{_nearest(key, list(machine.provenance))}")
+        section[last] = value
+    sections = {key: table[key] for key in SECTIONS if table.get(key) is not None}
+    origins = machine.provenance | dict.fromkeys(values, (provenance, source))
+    return _convert(sections, origins, machine.name)
+
+
+def _build(table: dict[str, Any], file: str) -> Machine:
+    """Take values and provenance apart, and convert."""
+    _check_keys(table, list(SECTIONS), {"fixed_function"}, "section", file)
+    sections: dict[str, Any] = {}
+    origins: dict[str, tuple[Provenance, str]] = {}
+    for name, struct in SECTIONS.items():
+        if name not in table:
+            continue
+        _check_keys(table[name], list(struct.__struct_fields__), set(), f"key of [{name}]", file)
+        sections[name] = table[name] if name == "identity" else _plain(table[name], name, origins, file)
+    return _convert(sections, origins, file)
+
+
+def _plain(table: dict[str, Any], prefix: str, origins: dict[str, tuple[Provenance, str]], file: str) -> dict[str, Any]:
+    """Values of a section; their provenance goes to ``origins``."""
+    values: dict[str, Any] = {}
+    for key, entry in table.items():
+        name = f"{prefix}.{key}"
+        if isinstance(entry, dict) and "value" not in entry and key == "per_clock":
+            values[key] = _plain(entry, name, origins, file)
+            continue
+        if not isinstance(entry, dict) or set(entry) != {"value", "provenance", "source"}:
+            raise TilestampError(f"{file}: {name} must be written {{ value = ..., provenance = ..., source = ... }}")
+        if entry["provenance"] not in Provenance.__args__:  # type: ignore[attr-defined]
+            raise TilestampError(f"{file}: {name} has the unknown provenance {entry['provenance']!r}")
+        values[key] = entry["value"]
+        origins[name] = (entry["provenance"], str(entry["source"]))
+    return values
+
+
+def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]], file: str) -> Machine:
+    digest = hashlib.sha256(msgspec.json.encode(sections, order="deterministic")).hexdigest()[:16]
+    whole = {"fixed_function": None} | sections | {"provenance": origins, "digest": digest}
+    try:
+        machine = msgspec.convert(whole, Machine)
+    except msgspec.ValidationError as error:
+        raise TilestampError(f"{file}: {str(error).replace('`', '').replace('$.', '')}") from error
+    _check_sense(machine, file)
+    return machine
+
+
+def _check_keys(table: Any, known: list[str], optional: set[str], what: str, file: str) -> None:
+    if not isinstance(table, dict):
+        raise TilestampError(f"{file}: a {what} must be a table")
+    for key in table:
+        if key not in known:
+            raise TilestampError(f"{file}: unknown {what} {key!r}{_nearest(key, known)}")
+    for key in known:
+        if key not in table and key not in optional:
+            raise TilestampError(f"{file}: missing {what} {key!r}")
+
+
+def _check_sense(machine: Machine, file: str) -> None:
+    """Refuse numbers that cannot all be true of one machine."""
+    sm, memory = machine.sm, machine.memory
+    contradictions = {
+        f"{sm.max_warps} warps of {sm.warp_size} are more than the {sm.max_threads} threads of an SM": (
+            sm.max_warps * sm.warp_size > sm.max_threads
+        ),
+        f"a block of {sm.max_threads_per_block} threads does not fit an SM of {sm.max_threads}": (
+            sm.max_threads_per_block > sm.max_threads
+        ),
+        f"one warp at {sm.max_registers_per_thread} registers a thread does not fit {sm.registers} registers": (
+            sm.max_registers_per_thread * sm.warp_size > sm.registers
+        ),
+        f"{memory.bank_lanes} lanes cannot access shared memory together in a warp of {sm.warp_size}": (
+            memory.bank_lanes > sm.warp_size
+        ),
+        "warp_size may be at most 64": sm.warp_size > 64,
+        "an L2 without l2_bytes_per_clock or latency.l2_cycles": (
+            memory.l2_bytes > 0 and (memory.l2_bytes_per_clock == 0 or machine.latency.l2_cycles == 0)
+        ),
+        "atomics in L2 units on a machine without L2": machine.atomics.place == "l2_unit" and memory.l2_bytes == 0,
+    }
+    for sentence, wrong in contradictions.items():
+        if wrong:
+            raise TilestampError(f"{file} contradicts itself: {sentence}")
+
+
+def _nearest(word: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(word, known, n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""

@@ -1,0 +1,132 @@
+"""Machine files: every number has a provenance, and a bad file is refused in a sentence."""
+
+import re
+
+import pytest
+
+from models.errors import TilestampError
+from models.machine import FOLDER, altered, list_machines, load_machine
+from models.simt import AtomicMerge, Coalescing
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """Write gtx280.toml with some text replaced; give the path."""
+
+    def edit(old, new):
+        text = (FOLDER / "gtx280.toml").read_text("utf-8")
+        assert old in text
+        path = tmp_path / "mine.toml"
+        path.write_text(text.replace(old, new, 1), "utf-8")
+        return path
+
+    return edit
+
+
+@pytest.mark.parametrize("name", list(list_machines()))
+def test_every_number_has_a_source(name):
+    machine = load_machine(name)
+    assert all(source for _, source in machine.provenance.values())
+
+
+@pytest.mark.parametrize("name", list(list_machines()))
+def test_a_machine_bears_the_name_of_its_file(name):
+    assert load_machine(name).name == name
+
+
+def test_a_number_keeps_its_provenance():
+    machine = load_machine("gtx280")
+    assert machine.sm.count == 30
+    assert machine.provenance["sm.count"][0] == "published"
+
+
+def test_gt200_counts_by_half_warps():
+    simt = load_machine("gtx280").simt
+    assert (simt.coalescing, simt.bank_lanes, simt.atomic_merge) == (
+        Coalescing.HALF_WARP_SEGMENTS,
+        16,
+        AtomicMerge.NONE,
+    )
+
+
+def test_h200_numbers_are_those_of_the_measurements(shared):
+    """The file says 'microbenchmarks.csv run4: GROUP CASE [METRIC]': look a plain one up."""
+    rows = [line.split(",") for line in (shared / "silicon" / "microbenchmarks.csv").read_text().splitlines()]
+    value = {row[2]: float(row[4]) for row in rows if row[5] == "run4" and row[1] == "latency"}
+    machine = load_machine("h200")
+    assert machine.latency.shared_cycles == pytest.approx(value["ld_shared"], rel=0.01)
+    assert machine.latency.dram_cycles == pytest.approx(value["ld_cg_1.04858e+06KiB"], rel=0.01)
+    assert machine.latency.atomic_cycles == pytest.approx(value["atom_global_add"], rel=0.01)
+
+
+def test_a_file_of_the_user_is_read_by_its_path(edited):
+    path = edited('name = "gtx280"', 'name = "mine"')
+    assert load_machine(path).name == "mine"
+
+
+def test_an_unknown_machine_is_refused_with_the_nearest_name():
+    with pytest.raises(TilestampError, match="did you mean 'gtx280'"):
+        load_machine("gtx290")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(TilestampError, match=re.escape("none.toml")):
+        load_machine(tmp_path / "none.toml")
+
+
+def test_an_unknown_key_is_refused_with_the_nearest_one(edited):
+    with pytest.raises(TilestampError, match=r"unknown key of \[sm\] 'max_warp' \(did you mean 'max_warps'"):
+        load_machine(edited("max_warps", "max_warp"))
+
+
+def test_an_unknown_section_is_refused(edited):
+    with pytest.raises(TilestampError, match=r"unknown section 'memry' \(did you mean 'memory'"):
+        load_machine(edited("[memory]", "[memry]"))
+
+
+def test_a_missing_key_is_named(edited):
+    with pytest.raises(TilestampError, match=r"missing key of \[sm\] 'max_blocks'"):
+        load_machine(edited("max_blocks = {", "# max_blocks = {"))
+
+
+def test_a_bare_number_without_provenance_is_refused(edited):
+    with pytest.raises(TilestampError, match=r"sm.count must be written"):
+        load_machine(edited("count = {", "count = 30 #"))
+
+
+def test_a_text_where_a_number_belongs_is_refused(edited):
+    with pytest.raises(TilestampError, match=r"sm.count"):
+        load_machine(edited("count = { value = 30,", 'count = { value = "many",'))
+
+
+def test_an_efficiency_above_one_is_refused(edited):
+    with pytest.raises(TilestampError, match=r"dram_efficiency"):
+        load_machine(edited("dram_efficiency = { value = 0.8", "dram_efficiency = { value = 1.8"))
+
+
+def test_more_warps_than_threads_allow_are_refused(edited):
+    with pytest.raises(TilestampError, match="contradicts itself: 48 warps of 32"):
+        load_machine(edited("max_warps = { value = 32", "max_warps = { value = 48"))
+
+
+def test_a_broken_file_is_refused(tmp_path):
+    path = tmp_path / "broken.toml"
+    path.write_text("[sm\n")
+    with pytest.raises(TilestampError, match="not a TOML file"):
+        load_machine(path)
+
+
+def test_a_what_if_says_what_it_is():
+    machine = altered(load_machine("gtx280"), {"sm.clock_mhz": 2592.0}, "assumed", "twice the clock")
+    assert machine.sm.clock_mhz == 2592.0
+    assert machine.provenance["sm.clock_mhz"] == ("assumed", "twice the clock")
+
+
+def test_a_what_if_has_another_digest():
+    machine = load_machine("gtx280")
+    assert altered(machine, {"atomics.conflict_ns": 1.0}, "fitted", "test").digest != machine.digest
+
+
+def test_a_what_if_of_an_unknown_number_is_refused():
+    with pytest.raises(TilestampError, match=r"did you mean 'sm\.clock_mhz'"):
+        altered(load_machine("gtx280"), {"sm.clok_mhz": 1.0}, "assumed", "test")
