@@ -1,0 +1,249 @@
+"""What bound and split costs: the events of its kernels, counted from the paths that the oracle took.
+
+The shape of the kernels is ours where the paper is silent: 256 threads a block, a thread a sub-patch; a queue entry of
+8 bytes (patch index; level, i and j packed); 16 loads of 16 bytes for the control points; storage wishes of 4 bytes.
+"""
+
+from dataclasses import replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from models.coalescing import contiguous, transactions
+from models.launch import Stream
+from models.simt import Simt
+from simulator.work import Work
+
+STAGE = "bound_and_split"
+BLOCK = 256  # threads
+ENTRY_BYTES = 8
+POINT_BYTES = 16  # a homogeneous control point
+POINTS = 16  # of a patch
+WORD_BYTES = 4
+_KEEP, _GIVE_UP = 1, 2  # Path of the oracle: from 3 on a patch is split
+_ACROSS = 3
+
+
+class TransformEvent(IntEnum):
+    """Events of one block that takes control points to clip space, a thread a point."""
+
+    POINT_WARPS = 0
+    POINT_LANES = 1
+    LOAD_TRANSACTIONS = 2
+    LOAD_BYTES = 3
+    STORE_TRANSACTIONS = 4
+    STORE_BYTES = 5
+
+
+class OracleEvent(IntEnum):
+    """Events of one block of the oracle, a thread a sub-patch."""
+
+    EXAMINE_WARPS = 0  # warps that fetch 16 control points, restrict them to the square and test them for the screen
+    EXAMINE_LANES = 1  # sub-patches
+    BOX_WARPS = 2  # warps of those in which a lane goes on to project the points and measure the box
+    BOX_LANES = 3
+    DIVERGENT_WARPS = 4  # warps in which some lanes measure a box and others do not
+    CULLED = 5
+    KEPT = 6
+    SPLIT = 7
+    GIVEN_UP = 8
+    LOAD_TRANSACTIONS = 9
+    LOAD_BYTES = 10
+    STORE_TRANSACTIONS = 11
+    STORE_BYTES = 12
+
+
+class SubdivideEvent(IntEnum):
+    """Events of one block of the subdivision, a thread a sub-patch."""
+
+    MOVE_WARPS = 0  # warps that load entries, wishes and places
+    MOVE_LANES = 1
+    KEEP_WARPS = 2  # warps in which a lane moves its entry
+    KEEP_LANES = 3
+    SPLIT_WARPS = 4  # warps in which a lane writes four children
+    SPLIT_LANES = 5
+    DIVERGENT_WARPS = 6  # warps that take both ways, or one with lanes idle
+    LOAD_TRANSACTIONS = 7
+    LOAD_BYTES = 8
+    STORE_TRANSACTIONS = 9
+    STORE_BYTES = 10
+
+
+_O = OracleEvent
+_S = SubdivideEvent
+_T = TransformEvent
+
+
+@njit(cache=True, nogil=True)
+def _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, row):
+    """Events of one warp of the oracle."""
+    boxes = 0
+    for lane in range(lanes):
+        found = path[first + lane]
+        boxes += found == _KEEP or found > _ACROSS
+        row[_O.KEPT] += found == _KEEP
+        row[_O.SPLIT] += found >= _ACROSS
+        row[_O.GIVEN_UP] += found == _GIVE_UP
+        row[_O.CULLED] += found == 0
+    row[_O.EXAMINE_WARPS] += 1
+    row[_O.EXAMINE_LANES] += lanes
+    row[_O.BOX_WARPS] += boxes > 0
+    row[_O.BOX_LANES] += boxes
+    row[_O.DIVERGENT_WARPS] += 0 < boxes < lanes
+    for lane in range(lanes):
+        addresses[lane] = np.int64(patch[first + lane]) * (POINTS * POINT_BYTES)
+    count, size = transactions(addresses, lanes, POINT_BYTES, coalescing)
+    row[_O.LOAD_TRANSACTIONS] += POINTS * count  # the 16 loads differ by less than a patch's segment
+    row[_O.LOAD_BYTES] += POINTS * size
+    for lane in range(lanes):
+        addresses[lane] = (first + lane) * ENTRY_BYTES
+    count, size = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
+    row[_O.LOAD_TRANSACTIONS] += count
+    row[_O.LOAD_BYTES] += size
+    count, size = contiguous(first * WORD_BYTES, lanes * WORD_BYTES, coalescing)
+    row[_O.STORE_TRANSACTIONS] += count
+    row[_O.STORE_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, row):
+    """Events of one warp of the subdivision: one store of what is kept, then four of children."""
+    kept = split = 0
+    for lane in range(lanes):
+        kept += path[first + lane] == _KEEP
+        split += path[first + lane] >= _ACROSS
+        addresses[lane] = (first + lane) * ENTRY_BYTES
+    row[_S.MOVE_WARPS] += 1
+    row[_S.MOVE_LANES] += lanes
+    row[_S.KEEP_WARPS] += kept > 0
+    row[_S.KEEP_LANES] += kept
+    row[_S.SPLIT_WARPS] += split > 0
+    row[_S.SPLIT_LANES] += split
+    row[_S.DIVERGENT_WARPS] += 0 < kept < lanes or 0 < split < lanes
+    entries, entry_bytes = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
+    words, word_bytes = contiguous(first * WORD_BYTES, lanes * WORD_BYTES, coalescing)
+    row[_S.LOAD_TRANSACTIONS] += entries + 2 * words
+    row[_S.LOAD_BYTES] += entry_bytes + 2 * word_bytes
+    for store in range(5):
+        if (kept if store == 0 else split) == 0:
+            continue
+        for lane in range(lanes):
+            found = path[first + lane]
+            active = found == _KEEP if store == 0 else found >= _ACROSS
+            child = max(store - 1, 0)
+            addresses[lane] = (np.int64(places[first + lane]) + child) * ENTRY_BYTES if active else -1
+        count, size = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
+        row[_S.STORE_TRANSACTIONS] += count
+        row[_S.STORE_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_block(block, patch, path, places, warp, coalescing, table):
+    """Events of one block; of the subdivision where ``places`` are given."""
+    addresses = np.empty(warp, np.int64)
+    end = min((block + 1) * BLOCK, path.shape[0])
+    for first in range(block * BLOCK, end, warp):
+        lanes = min(warp, end - first)
+        if places is None:
+            _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, table[block])
+        else:
+            _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, table[block])
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _count_blocks(patch, path, places, warp, coalescing, table):
+    for block in prange(table.shape[0]):
+        _count_block(block, patch, path, places, warp, coalescing, table)
+
+
+def _blocks(threads: int) -> int:
+    return -(-threads // BLOCK)
+
+
+def _work(kernel: str, events: type[IntEnum], table: NDArray[np.int64], *streams: Stream) -> Work:
+    return Work(STAGE, kernel, events, table, len(table), BLOCK, streams=streams)
+
+
+def transform_work(patches: int, simt: Simt) -> Work:
+    """Work of taking the control points of all urPatches to clip space, once a frame."""
+    points = patches * POINTS
+    threads = np.minimum(BLOCK, points - BLOCK * np.arange(_blocks(points)))
+    table = np.zeros((len(threads), len(_T)), np.int64)
+    table[:, _T.POINT_WARPS] = -(-threads // simt.warp)
+    table[:, _T.POINT_LANES] = threads
+    addresses = np.arange(simt.warp, dtype=np.int64) * POINT_BYTES
+    count, size = transactions(addresses, simt.warp, POINT_BYTES, simt.coalescing)
+    half = transactions(addresses, simt.warp // 2, POINT_BYTES, simt.coalescing)
+    odd = threads % simt.warp > 0  # points come by 16: the last warp may be half full
+    for column, whole, part in ((_T.LOAD_TRANSACTIONS, count, half[0]), (_T.LOAD_BYTES, size, half[1])):
+        moved = threads // simt.warp * whole + odd * part
+        table[:, column] = moved
+        table[:, column + 2] = moved
+    total, nbytes = int(table[:, _T.LOAD_BYTES].sum()), points * POINT_BYTES
+    load, store = Stream("points", "load", total, nbytes), Stream("clip_points", "store", total, nbytes)
+    return _work("transform", _T, table, load, store)
+
+
+def oracle_work(patch: NDArray[np.int32], path: NDArray[np.uint8], simt: Simt) -> Work:
+    """Work of one pass of the oracle.
+
+    Parameters
+    ----------
+    patch, path : ndarray, (queue length,)
+        urPatch, and the oracle's ``Path``, of each sub-patch.
+    simt : Simt
+    """
+    table = np.zeros((_blocks(len(path)), len(_O)), np.int64)
+    _count_blocks(patch, path, None, simt.warp, simt.coalescing, table)
+    total = table.sum(axis=0)
+    entries = len(path) * ENTRY_BYTES
+    distinct = 1 + int(np.count_nonzero(np.diff(patch))) if len(patch) else 0
+    return _work(
+        "oracle",
+        _O,
+        table,
+        Stream("queue", "load", entries, entries),
+        Stream("clip_points", "load", int(total[_O.LOAD_BYTES]) - entries, distinct * POINTS * POINT_BYTES),
+        Stream("slots", "store", int(total[_O.STORE_BYTES]), len(path) * WORD_BYTES),
+    )
+
+
+def scan_works(scan: list[Work]) -> list[Work]:
+    """Works of the scan, which is that of bucketing, under the names of this stage."""
+    names: dict[str, Any] = {"COUNT": "slots", "START": "places"}
+    return [
+        replace(
+            work,
+            stage=STAGE,
+            streams=tuple(replace(stream, buffer=names.get(stream.buffer, stream.buffer)) for stream in work.streams),
+        )
+        for work in scan
+    ]
+
+
+def subdivide_work(path: NDArray[np.uint8], places: NDArray[np.uint32], simt: Simt) -> Work:
+    """Work of one pass of the subdivision.
+
+    Parameters
+    ----------
+    path, places : ndarray, (queue length,)
+        The oracle's ``Path``, and the first slot in the other queue, of each sub-patch.
+    simt : Simt
+    """
+    table = np.zeros((_blocks(len(path)), len(_S)), np.int64)
+    _count_blocks(path, path, places, simt.warp, simt.coalescing, table)
+    total = table.sum(axis=0)
+    loads = len(path) * (ENTRY_BYTES + 2 * WORD_BYTES)
+    written = int(total[_S.KEEP_LANES] + 4 * total[_S.SPLIT_LANES]) * ENTRY_BYTES
+    return _work(
+        "subdivide",
+        _S,
+        table,
+        Stream("queue", "load", len(path) * ENTRY_BYTES, len(path) * ENTRY_BYTES),
+        Stream("slots", "load", len(path) * WORD_BYTES, len(path) * WORD_BYTES),
+        Stream("places", "load", int(total[_S.LOAD_BYTES]) - loads + len(path) * WORD_BYTES, len(path) * WORD_BYTES),
+        Stream("queue", "store", int(total[_S.STORE_BYTES]), written),
+    )
