@@ -1,0 +1,225 @@
+"""Fine raster: one warp a tile of 8x8 pixels, in shared memory (Laine & Karras 2011, section 6).
+
+A warp reads the tile's list 32 entries at a time, drops those behind the tile's largest depth, finds the coverage of
+the others, and draws their fragments 32 at a time, in input order: depth test, shading, conflict-free writes.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.simt import Coalescing, Simt
+from simulator.stages.fine_raster_multi import draw_tile_multi
+from simulator.stages.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent, corner, new_tile, start_tile
+from simulator.stages.fine_raster_single import draw_tile_single
+from simulator.stages.subtriangle import DEPTH_MAX, DEPTH_MIN
+from simulator.stages.triangle_setup import Release, Setup
+from simulator.work import Work
+
+Mode = Literal["depth", "blend", "depth-only", "color"]
+
+WARPS = 20  # a block
+TABLE_BYTES = 6144  # edge coverage, shared
+WARP_BYTES = {1: 2112, 2: 1856, 4: 1856, 8: 1856}
+MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colour, interpolate
+    "depth": (True, False, True, True),
+    "blend": (False, True, True, True),
+    "depth-only": (True, False, False, False),
+    "color": (False, False, True, False),
+}
+WARP_LINES = int(Coalescing.WARP_LINES)
+_CHUNK = 32  # tiles that one call of the worker takes
+
+
+class FrameBuffers(NamedTuple):
+    """Pixels of a frame, whole tiles, row 0 the lowest row; samples first."""
+
+    color: NDArray[np.uint32]  # (samples, height, width) RGBA from the low byte up
+    depth: NDArray[np.uint32]  # fixed point, smaller is nearer
+    ids: NDArray[np.int32]  # input triangle, -1 where nothing was drawn
+
+
+@njit(cache=True, nogil=True)
+def _load_tile(buffers, draw, tile, x, y):
+    for sample in range(1 << draw.log_samples):
+        for p in range(PIXELS):
+            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
+            if draw.clear:
+                tile.color[at], tile.depth[at], tile.ids[at] = draw.clear_color, draw.clear_depth, -1
+            else:
+                tile.color[at] = buffers.color[sample, j, i]
+                tile.depth[at] = buffers.depth[sample, j, i]
+                tile.ids[at] = buffers.ids[sample, j, i]
+
+
+@njit(cache=True, nogil=True)
+def _store_tile(buffers, draw, tile, x, y):
+    for sample in range(1 << draw.log_samples):
+        for p in range(PIXELS):
+            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
+            buffers.color[sample, j, i] = tile.color[at]
+            buffers.depth[sample, j, i] = tile.depth[at]
+            buffers.ids[sample, j, i] = tile.ids[at]
+
+
+@njit(cache=True, nogil=True)
+def _count_tile(draw, row):
+    """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
+
+    Surfaces are laid out in two dimensions, so that a row of a tile is one 32-byte segment on every machine. Samples
+    stay in memory: with several of them the clear writes the tile, and nothing else here does.
+    """
+    for column in (23, 24, 25, 26):
+        row[column] += 1
+    row[27] += 2  # the tile's number and its first segment
+    row[28] += 2 * (128 if draw.coalescing == WARP_LINES else 32)
+    surfaces = (1 if draw.write_color or draw.later_wins else 0) + 1
+    rows = surfaces * TILE << draw.log_samples
+    if not draw.clear and draw.log_samples == 0:
+        row[21] += 1
+        row[27] += rows
+        row[28] += 32 * rows
+    if draw.clear or draw.log_samples == 0:
+        row[22] += 1
+        row[29] += rows
+        row[30] += 32 * rows
+
+
+@njit(cache=True, nogil=True)
+def _draw_tiles(first, last, active, starts, entries, setup, colors, draw, buffers, table):
+    """Draw active tiles first..last-1."""
+    tile = new_tile(1 << draw.log_samples)
+    for a in range(first, last):
+        t = active[a]
+        left, bottom = corner(t, draw)
+        x, y = (t % draw.tiles_x) * TILE, (t // draw.tiles_x) * TILE
+        _load_tile(buffers, draw, tile, x, y)
+        start_tile(tile, starts[t], starts[t + 1])
+        if table is None:
+            draw_tile(setup, entries, colors, draw, tile, left, bottom, None)
+        else:
+            draw_tile(setup, entries, colors, draw, tile, left, bottom, table[a])
+            _count_tile(draw, table[a])
+        _store_tile(buffers, draw, tile, x, y)
+
+
+@njit(cache=True, nogil=True)
+def draw_tile(setup, entries, colors, draw, tile, left, bottom, row):
+    """Draw the list of one tile."""
+    if draw.log_samples > 0:
+        draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
+    else:
+        draw_tile_single(setup, entries, colors, draw, tile, left, bottom, row)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _draw_all(active, starts, entries, setup, colors, draw, buffers, table):
+    for c in prange((active.size + _CHUNK - 1) // _CHUNK):
+        last = min((c + 1) * _CHUNK, active.size)
+        _draw_tiles(c * _CHUNK, last, active, starts, entries, setup, colors, draw, buffers, table)
+
+
+def new_buffers(width: int, height: int, samples: int = 1) -> FrameBuffers:
+    """Allocate the pixels of a frame, whole tiles, cleared to black and far."""
+    shape = (samples, -(-height // TILE) * TILE, -(-width // TILE) * TILE)
+    return FrameBuffers(np.zeros(shape, np.uint32), np.full(shape, DEPTH_MAX, np.uint32), np.full(shape, -1, np.int32))
+
+
+def clear_depth_value(depth: float) -> int:
+    """Fixed-point depth that a clear to ``depth`` in 0..1 writes; 1 is the far plane."""
+    whole = min(int(depth * 2**32), 2**32 - 1)
+    return int(whole / (2**32 - 1) * (DEPTH_MAX - DEPTH_MIN) + DEPTH_MIN)
+
+
+def fine_raster(
+    setup: Setup,
+    tile_starts: NDArray[np.int64],
+    tile_entries: NDArray[np.int32],
+    active_tiles: NDArray[np.int32],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Release,
+    samples: int = 1,
+    mode: Mode = "depth",
+    colors: NDArray[np.float32] | None = None,
+    buffers: FrameBuffers | None = None,
+    clear_color: int = 0,
+    clear_depth: float = 1.0,
+    counting: bool = True,
+) -> tuple[FrameBuffers, Work]:
+    """Draw the queued triangles of all active tiles.
+
+    Parameters
+    ----------
+    setup : Setup
+        From triangle setup, with planes for the same mode.
+    tile_starts : ndarray, (tiles + 1,), int64
+        Where each tile's list starts; tile = column + row * columns, row 0 the lowest.
+    tile_entries : ndarray, int32
+        Slots, in input order within a tile.
+    active_tiles : ndarray, int32
+        Tiles to draw, in the order in which warps draw them.
+    width, height : int
+        Viewport, pixels.
+    simt : Simt
+    release : {"1.1", "nvdiffrast"}
+    samples : int
+    mode : {"depth", "blend", "depth-only", "color"}
+        Depth test and interpolation; no depth, interpolation, blending; depth alone; neither depth nor interpolation.
+    colors : ndarray, (V, 4), float32, or None
+        Linear RGBA of the vertices; None: white.
+    buffers : FrameBuffers or None
+        Pixels of earlier draws, drawn over in place; None: tiles start from the clear values.
+    clear_color : int
+        RGBA from the low byte up.
+    clear_depth : float
+        0 to 1; release nvdiffrast always clears to 1.
+    counting : bool
+
+    Returns
+    -------
+    buffers : FrameBuffers
+    work : Work
+        A row an active tile.
+
+    Raises
+    ------
+    TilestampError
+        For an unknown mode.
+    """
+    if mode not in MODES:
+        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
+    depth, blend, write_color, interpolate = MODES[mode]
+    draw = Draw(
+        log_samples=samples.bit_length() - 1,
+        later_wins=release == "nvdiffrast",
+        depth=depth,
+        blend=blend,
+        write_color=write_color,
+        interpolate=interpolate,
+        clear=buffers is None,
+        clear_color=clear_color,
+        clear_depth=clear_depth_value(clear_depth),
+        half_width=8 * width,
+        half_height=8 * height,
+        tiles_x=-(-width // TILE),
+        coalescing=int(simt.coalescing),
+    )
+    buffers = new_buffers(width, height, samples) if buffers is None else buffers
+    if colors is None:
+        colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
+    table = np.zeros((len(active_tiles) if counting else 0, len(FineRasterEvent)), np.int64)
+    with np.errstate(all="ignore"):
+        _draw_all(
+            active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers, table if counting else None
+        )  # fmt: skip
+    shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
+    work = Work(
+        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, dispatch="warp_queue"
+    )
+    return buffers, work
