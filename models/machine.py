@@ -48,7 +48,7 @@ class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     registers: Count
     register_unit: Count  # registers are allotted in multiples of this
     register_allocation: Literal["block", "warp"]  # to whom
-    warp_granularity: Count  # warps of a block are rounded up to a multiple of this
+    warp_granularity: Count  # warps of a block (1.x) or of an SM (later) that get registers come in multiples of this
     max_registers_per_thread: Count
     shared_bytes: Size
     shared_unit_bytes: Count

@@ -1,4 +1,4 @@
-"""The SIMT shape of a machine: what counting depends on. Another shape means executing again; all else only re-prices."""
+"""The SIMT shape of a machine: what counting depends on. Another shape means executing again; the rest re-prices."""
 
 from enum import IntEnum
 from typing import NamedTuple

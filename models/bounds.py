@@ -1,0 +1,100 @@
+"""Bounds: a roofline for each launch, one term for each thing that can limit it.
+
+========  ===========================================================================================================
+issue     schedulers and execution units, all SMs equally busy
+shared    passes through shared memory, all SMs equally busy
+l1        bytes between registers and the memory system, all SMs equally busy
+latency   Little's law: dependent chains of all units / units that are resident together
+dram, l2  bytes / bandwidth
+atomic    requests and conflicts / rate of all atomic units
+queue     requests at the fullest atomic unit: contention
+start     blocks / block launch rate
+launch    overhead of the kernel
+========  ===========================================================================================================
+
+time = launch + the largest of the others. It supposes that the units are many and alike; ``models.schedule`` does not.
+"""
+
+import numpy as np
+
+from models.demand import Demand, demand
+from models.launch import Launch
+from models.machine import Machine
+from models.occupancy import Residency, residency
+from models.timing import Timing
+from models.traffic import Traffic
+
+
+def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
+    """Price one launch by its largest term.
+
+    Parameters
+    ----------
+    launch : Launch
+    machine : Machine
+    moved : Traffic
+        Its bytes, from ``models.traffic``.
+
+    Raises
+    ------
+    TilestampError
+        A block that the machine cannot launch.
+    """
+    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
+    terms = bound_terms(launch, machine, demand(launch, machine, moved), held)
+    bound = max(terms, key=lambda name: terms[name])
+    cycles = terms["launch"] + max(value for name, value in terms.items() if name != "launch")
+    return timing(launch, machine, moved, held, terms, cycles, bound)
+
+
+def bound_terms(launch: Launch, machine: Machine, asked: Demand, held: Residency) -> dict[str, float]:
+    """Cycles of each term."""
+    sms = machine.sm.count
+    resident = max(1, min(len(asked.alone), int(slots(launch, machine, held).sum())))
+    blocks = launch.grid if launch.dispatch == "blocks" else 0
+    return {
+        "issue": float(asked.issue.sum()) / sms,
+        "shared": float(asked.shared.sum()) / sms,
+        "l1": float(asked.l1.sum()) / sms,
+        "latency": float(asked.alone.sum()) / resident,
+        "dram": float(asked.dram.sum()),
+        "l2": float(asked.l2.sum()),
+        "atomic": float(asked.atomic.sum()),
+        "queue": float(asked.queue.sum()),
+        "start": blocks / machine.launch.blocks_per_us * machine.sm.clock_mhz,
+        "launch": machine.launch.kernel_us * machine.sm.clock_mhz,
+    }
+
+
+def slots(launch: Launch, machine: Machine, held: Residency) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Units that each SM can hold: blocks dealt to the SMs one after another, warps where each warp draws its own."""
+    sms = machine.sm.count
+    blocks = min(launch.grid, sms * held.blocks)
+    dealt = np.full(sms, blocks // sms, np.int64)
+    dealt[: blocks % sms] += 1
+    return dealt * (-(-launch.block // machine.sm.warp_size) if launch.dispatch == "warp_queue" else 1)
+
+
+def timing(
+    launch: Launch,
+    machine: Machine,
+    moved: Traffic,
+    held: Residency,
+    terms: dict[str, float],
+    cycles: float,
+    bound: str,
+    **details: float,
+) -> Timing:
+    """Put a result together."""
+    return Timing(
+        stage=launch.stage,
+        kernel=launch.kernel,
+        terms=terms,
+        cycles=cycles,
+        milliseconds=cycles / machine.clock_hz * 1e3,
+        bound=bound,
+        occupancy=held.occupancy,
+        dram_bytes=moved.dram_bytes,
+        l2_bytes=moved.l2_bytes,
+        details={"resident_blocks": float(held.blocks)} | details,
+    )

@@ -1,0 +1,142 @@
+"""Demands: what each unit of a launch asks of its SM and of the chip, in cycles.
+
+A unit of work (a block, or an item drawn by a persistent block or warp) holds
+
+issue       the schedulers of its SM, by ``[issue]``: warp instructions x cycles / schedulers; or, if longer, one
+            execution unit behind them, by ``[pipe]`` (they work side by side, so the fullest one counts)
+shared      the shared memory of its SM: passes x cycles, replays included
+l1          the load/store path of its SM: bytes of its transactions
+dram, l2    the chip's bandwidths: its share of the launch's bytes
+atomic      the chip's atomic units together: requests, and lanes that conflict
+queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there
+
+and cannot finish before its ``alone`` time: the round trips of its dependent chain, or its own instructions when too
+few warps share them among the schedulers.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.events import INSTRUCTION_CLASSES
+from models.events import MachineEvent as E
+from models.launch import Launch
+from models.machine import Machine
+from models.traffic import Traffic
+
+Cycles = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Demand:
+    """Cycles by unit of work, each array (units,), float64.
+
+    Parameters
+    ----------
+    issue, shared, l1 : ndarray
+        On the unit's own SM.
+    dram, l2, atomic, queue : ndarray
+        Of the whole chip.
+    alone : ndarray
+        What the unit takes with the machine to itself.
+    """
+
+    issue: Cycles
+    shared: Cycles
+    l1: Cycles
+    dram: Cycles
+    l2: Cycles
+    atomic: Cycles
+    queue: Cycles
+    alone: Cycles
+
+
+def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
+    """Cycles that each unit of a launch asks for.
+
+    Parameters
+    ----------
+    launch : Launch
+    machine : Machine
+    moved : Traffic
+        Bytes of the launch.
+    """
+    events = launch.events
+    memory = machine.memory
+    groups = machine.sm.warp_size / memory.bank_lanes
+    dispatch = _dispatch(events, machine)
+    issue = np.maximum(dispatch, _fullest_pipe(events, machine))
+    passes = (events[:, E.SHARED] + events[:, E.SHARED_ATOMIC]) * groups + events[:, E.BANK_REPLAYS]
+    bytes_moved = events[:, E.LOAD_BYTES] + events[:, E.STORE_BYTES]
+    share = _shares(bytes_moved)
+    l2_cycles = moved.l2_bytes / memory.l2_bytes_per_clock if memory.l2_bytes else 0.0
+    one_warp_of = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
+    spread = machine.sm.schedulers / min(machine.sm.schedulers, one_warp_of)
+    return Demand(
+        issue=issue,
+        shared=passes * memory.bank_pass_cycles,
+        l1=bytes_moved / memory.l1_bytes_per_clock,
+        dram=share * (moved.dram_bytes / machine.dram_bytes_per_cycle),
+        l2=share * l2_cycles,
+        atomic=_atomic(events, machine),
+        queue=_shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine),
+        alone=np.maximum(_chain(launch, machine, moved), issue * spread),
+    )
+
+
+def _dispatch(events: Cycles, machine: Machine) -> Cycles:
+    """SM cycles in which the schedulers are held."""
+    costs = np.array([getattr(machine.issue, event.name.lower()) for event in INSTRUCTION_CLASSES])
+    held: Cycles = events[:, : len(INSTRUCTION_CLASSES)] @ costs
+    return held / machine.sm.schedulers
+
+
+def _fullest_pipe(events: Cycles, machine: Machine) -> Cycles:
+    """SM cycles of the execution unit that is held longest."""
+    pipe = machine.pipe
+    pipes = (
+        events[:, E.FP32] * pipe.fp32,
+        events[:, E.INT32] * pipe.int32 + events[:, E.CONTROL] * pipe.control,
+        events[:, E.MUL32] * pipe.mul32,
+        events[:, E.SFU] * pipe.sfu,
+    )
+    longest: Cycles = np.max(np.stack(pipes), axis=0)
+    return longest / machine.sm.schedulers
+
+
+def _chain(launch: Launch, machine: Machine, moved: Traffic) -> Cycles:
+    """Cycles of the dependent round trips of each unit; a block also waits for its own start."""
+    latency = machine.latency
+    near = latency.l2_cycles if machine.memory.l2_bytes else latency.dram_cycles
+    load = near + (latency.dram_cycles - near) * min(1.0, moved.load_miss)
+    columns = [E.CHAIN_ALU, E.CHAIN_SHARED, E.CHAIN_LOAD, E.CHAIN_ATOMIC, E.CHAIN_BARRIER]
+    cycles = [latency.alu_cycles, latency.shared_cycles, load, latency.atomic_cycles, latency.barrier_cycles]
+    waited: Cycles = launch.events[:, columns] @ np.array(cycles)
+    return waited + (latency.block_launch_cycles if launch.dispatch == "blocks" else 0.0)
+
+
+def _atomic(events: Cycles, machine: Machine) -> Cycles:
+    """Cycles of all atomic units together."""
+    atomics = machine.atomics
+    conflict_cycles = atomics.conflict_ns * machine.clock_hz * 1e-9
+    return events[:, E.ATOMIC_REQUESTS] / atomics.requests_per_clock + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
+
+
+def _fullest_queue(launch: Launch, machine: Machine) -> float:
+    """Cycles for which the atomic unit with the most requests is held."""
+    if launch.atomic_requests is None or not launch.atomic_requests.any():
+        return 0.0
+    atomics = machine.atomics
+    chunk = np.arange(len(launch.atomic_requests)) * 32
+    unit = chunk // atomics.unit_bytes
+    if atomics.units:
+        unit %= atomics.units
+    fullest = float(np.bincount(unit, weights=launch.atomic_requests).max())
+    return fullest * atomics.unit_ns_per_request * machine.clock_hz * 1e-9
+
+
+def _shares(amounts: Cycles) -> Cycles:
+    """Each unit's share of a total; equal shares of nothing."""
+    total = amounts.sum()
+    return amounts / total if total > 0 else np.full(len(amounts), 1.0 / max(1, len(amounts)))

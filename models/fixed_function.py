@@ -1,0 +1,68 @@
+"""Fixed function: a pipe of units, each with a rate; the slowest one sets the time.
+
+A launch of the pipe says how many items pass each unit, by the unit's name in the machine file
+(``[fixed_function.per_clock]``); units overlap perfectly, and DRAM carries the bytes beside them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from models.errors import TilestampError
+from models.launch import Stream
+from models.machine import Machine
+from models.timing import Timing
+from models.traffic import Traffic
+
+
+@dataclass(frozen=True)
+class PipeLaunch:
+    """One pass through the fixed-function pipe.
+
+    Parameters
+    ----------
+    stage, kernel : str
+    items : mapping of str to float
+        Items by unit, such as ``{"primitives": 2.4e6, "pixels": 1.9e6}``.
+    streams : tuple of Stream
+        The buffers touched.
+    """
+
+    stage: str
+    kernel: str
+    items: Mapping[str, float] = field(default_factory=dict)
+    streams: tuple[Stream, ...] = ()
+
+
+def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
+    """Price one pass: launch overhead and the slowest of units and DRAM.
+
+    Raises
+    ------
+    TilestampError
+        A machine without fixed function, or without a unit that the launch names.
+    """
+    pipe = machine.fixed_function
+    if pipe is None:
+        raise TilestampError(f"the machine {machine.name} describes no fixed-function pipe")
+    unknown = [name for name in launch.items if name not in pipe.per_clock]
+    if unknown:
+        raise TilestampError(
+            f"the machine {machine.name} has no fixed-function unit {unknown[0]!r}; it has {', '.join(pipe.per_clock)}"
+        )
+    ratio = machine.sm.clock_mhz / pipe.clock_mhz  # terms are in cycles of the SMs, like those of every launch
+    terms = {name: count / pipe.per_clock[name] * ratio for name, count in launch.items.items()}
+    terms["dram"] = moved.dram_bytes / machine.dram_bytes_per_cycle
+    slowest = max(terms.values())
+    terms["launch"] = machine.launch.kernel_us * machine.sm.clock_mhz
+    cycles = terms["launch"] + slowest
+    return Timing(
+        stage=launch.stage,
+        kernel=launch.kernel,
+        terms=terms,
+        cycles=cycles,
+        milliseconds=cycles / machine.clock_hz * 1e3,
+        bound=max(terms, key=lambda name: terms[name]),
+        occupancy=0.0,
+        dram_bytes=moved.dram_bytes,
+        l2_bytes=moved.l2_bytes,
+    )

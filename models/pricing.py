@@ -1,0 +1,61 @@
+"""Price: the launches of a frame, in order, on a machine, at the fidelity asked for."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from models.bounds import bounds
+from models.errors import TilestampError
+from models.fixed_function import PipeLaunch, pipe_time
+from models.launch import Launch
+from models.machine import Machine
+from models.occupancy import residency
+from models.schedule import schedule
+from models.timing import Timing
+from models.traffic import Traffic, traffic
+
+Fidelity = Literal["counts", "bounds", "schedule"]
+FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "schedule")
+
+
+def price(launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: Fidelity = "schedule") -> list[Timing]:
+    """Price the launches of one frame.
+
+    Parameters
+    ----------
+    launches : sequence of Launch or PipeLaunch
+        In launch order: what a launch leaves in the cache, a later one finds there.
+    machine : Machine
+    fidelity : {"counts", "bounds", "schedule"}
+        No time at all; a roofline for each launch; units of work played on the SMs.
+
+    Returns
+    -------
+    list of Timing
+        One for each launch.
+
+    Raises
+    ------
+    TilestampError
+        An unknown fidelity, or a block that the machine cannot launch.
+    """
+    if fidelity not in FIDELITIES:
+        raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
+    moved = traffic(launches, machine)
+    return [_one(launch, machine, bytes_, fidelity) for launch, bytes_ in zip(launches, moved, strict=True)]
+
+
+def _one(launch: Launch | PipeLaunch, machine: Machine, moved: Traffic, fidelity: Fidelity) -> Timing:
+    if fidelity == "counts":
+        return _counts(launch, machine, moved)
+    if isinstance(launch, PipeLaunch):
+        return pipe_time(launch, machine, moved)
+    return schedule(launch, machine, moved) if fidelity == "schedule" else bounds(launch, machine, moved)
+
+
+def _counts(launch: Launch | PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
+    """Everything but time."""
+    nan = float("nan")
+    occupancy = 0.0
+    if isinstance(launch, Launch):
+        occupancy = residency(machine, launch.block, launch.registers, launch.shared_bytes).occupancy
+    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, moved.dram_bytes, moved.l2_bytes)

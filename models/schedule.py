@@ -1,0 +1,184 @@
+"""Schedule: units of work played against each other on the SMs.
+
+The machine hands units to SMs in order: a block to the SM with the most free places, not faster than the block launch
+rate; an item of a queue to whichever persistent block or warp is free. What is resident shares:
+
+*An SM.* A unit that would take ``alone`` cycles by itself and needs ``d`` cycles of its SM (schedulers, execution
+units, shared memory, load path: the largest) loads the SM by ``d / alone``. While the loads of all residents add up
+to S <= 1, each runs at its own pace; beyond, all of them slow down by S. So an SM has a clock of its own that runs at
+1 / max(1, S), and a unit ends when that clock has advanced by ``alone``.
+
+*The chip.* DRAM, L2, all atomic units and the fullest one are servers of the whole chip. Each unit loads them in the
+same way; while the fullest is loaded by C > 1, everything slows down by C. So time itself is stretched by
+max(1, C), and events need no second look.
+
+Both loads change only when a unit starts or ends, so the play is exact and costs one step for each unit. It shows
+what a roofline cannot: idle SMs when units are few, SMs that are half empty, and the tail when units are unlike.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.bounds import bound_terms, slots, timing
+from models.demand import Demand, demand
+from models.launch import Launch
+from models.machine import Machine
+from models.occupancy import residency
+from models.timing import Timing
+from models.traffic import Traffic
+
+MOST_UNITS = 1_000_000  # beyond, neighbours are played as one unit
+SERVERS = 4  # of the whole chip: DRAM, L2, atomic units together, the fullest atomic unit
+EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
+
+
+def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
+    """Price one launch by playing its units on the SMs.
+
+    Parameters
+    ----------
+    launch : Launch
+    machine : Machine
+    moved : Traffic
+        Its bytes, from ``models.traffic``.
+
+    Returns
+    -------
+    Timing
+        Never below ``bounds``. ``details`` has ``busy_sms`` (SMs that got a unit) and ``tail_cycles`` (from the start
+        of the last unit to the end).
+
+    Raises
+    ------
+    TilestampError
+        A block that the machine cannot launch.
+    """
+    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
+    asked = demand(launch, machine, moved)
+    terms = bound_terms(launch, machine, asked, held)
+    sm, chip, alone = _grouped(asked)
+    interval = machine.sm.clock_mhz / machine.launch.blocks_per_us * launch.grid / max(1, len(alone))
+    places = slots(launch, machine, held)
+    end, last_start, busy = _play(sm, chip, alone, places, interval if launch.dispatch == "blocks" else 0.0)
+    if launch.dispatch != "blocks" and len(alone):  # persistent blocks start once
+        end += machine.latency.block_launch_cycles
+        last_start += machine.latency.block_launch_cycles
+    work = {name: value for name, value in terms.items() if name != "launch"}
+    played = max(end, *work.values())
+    return timing(
+        launch,
+        machine,
+        moved,
+        held,
+        terms,
+        terms["launch"] + played,
+        _holds(terms, played, end - last_start, busy < machine.sm.count),
+        busy_sms=float(busy),
+        tail_cycles=end - last_start,
+    )
+
+
+def _holds(terms: dict[str, float], played: float, tail: float, some_idle: bool) -> str:
+    """Name what holds: a term, or the lack of balance that the terms do not see."""
+    largest = max(terms, key=lambda name: terms[name])
+    if largest == "launch" and terms["launch"] > played:
+        return largest
+    roof = max(value for name, value in terms.items() if name != "launch")
+    if played <= EXCESS * roof:
+        return max((name for name in terms if name != "launch"), key=lambda name: terms[name])
+    if some_idle:
+        return "balance"
+    return "tail" if tail > (played - roof) / 2 else largest
+
+
+def _grouped(asked: Demand) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Cycles on the SM (units,), on the chip (units, SERVERS), and alone (units,); neighbours added where too many."""
+    sm = np.maximum(np.maximum(asked.issue, asked.shared), asked.l1)
+    chip = np.stack((asked.dram, asked.l2, asked.atomic, asked.queue), axis=1)
+    alone = np.maximum(np.maximum(asked.alone, sm), 1.0)
+    group = -(-len(alone) // MOST_UNITS)
+    if group > 1:
+        first = np.arange(0, len(alone), group)
+        sm, chip, alone = (np.add.reduceat(column, first, axis=0) for column in (sm, chip, alone))
+    return np.ascontiguousarray(sm), np.ascontiguousarray(chip), np.ascontiguousarray(alone)
+
+
+@njit(cache=True, nogil=True)
+def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple[float, float, int]:
+    """Play all units; return the end, the start of the last unit (cycles), and the SMs that got any.
+
+    ``ends[s, p]`` is the reading of SM s's own clock at which the unit in place p ends, infinite where it is free.
+    ``now`` is unstretched time, ``time`` is real; ``wake[s]`` is the ``now`` of the next end on SM s.
+    """
+    sms = len(places)
+    most = max(1, places.max())
+    ends = np.full((sms, most), np.inf)
+    unit = np.zeros((sms, most), np.int64)
+    free = places.copy()
+    load = np.zeros(sms)  # S of each SM
+    clock = np.zeros(sms)  # its own clock, at ``read``
+    read = np.zeros(sms)
+    wake = np.full(sms, np.inf)
+    server = np.zeros((sms, SERVERS))  # what the units of an SM load the chip with, at their own pace
+    chip_load = np.zeros(SERVERS)
+    used = np.zeros(sms, np.bool_)
+    vacant = free.sum()
+    time = 0.0
+    now = 0.0
+    last_start = 0.0
+    started = 0
+    ended = 0
+    while ended < len(alone):
+        stretch = max(1.0, chip_load.max())
+        s = np.argmin(wake)
+        start = False
+        if started < len(alone) and vacant > 0:
+            ready = now + max(0.0, started * interval - time) / stretch
+            start = ready <= wake[s]
+        moment = ready if start else wake[s]
+        time += (moment - now) * stretch
+        now = moment
+        if start:
+            s = np.argmax(free)
+        # the SM's own clock up to now, before its load changes
+        clock[s] += (now - read[s]) / max(1.0, load[s])
+        read[s] = now
+        if start:
+            place = np.argmax(ends[s, : places[s]])
+            i = started
+            ends[s, place] = clock[s] + alone[i]
+            unit[s, place] = i
+            started += 1
+            last_start = time
+            used[s] = True
+            sign = 1.0
+        else:
+            place = np.argmin(ends[s])
+            i = unit[s, place]
+            ends[s, place] = np.inf
+            ended += 1
+            sign = -1.0
+        _change(s, i, sign, sm, chip, alone, load, server, chip_load)
+        free[s] -= int(sign)
+        vacant -= int(sign)
+        if free[s] == places[s]:  # empty: leave no rounding behind
+            load[s] = 0.0
+        wake[s] = now + max(0.0, ends[s].min() - clock[s]) * max(1.0, load[s])
+    return time, last_start, used.sum()
+
+
+@njit(cache=True, nogil=True)
+def _change(
+    s: int, i: int, sign: float, sm: Any, chip: Any, alone: Any, load: Any, server: Any, chip_load: Any
+) -> None:
+    """Add (or take away) unit i to the loads of SM s and of the chip."""
+    before = 1.0 / max(1.0, load[s])
+    load[s] = max(0.0, load[s] + sign * sm[i] / alone[i])
+    after = 1.0 / max(1.0, load[s])
+    for k in range(SERVERS):
+        loaded = max(0.0, server[s, k] + sign * chip[i, k] / alone[i])
+        chip_load[k] += loaded * after - server[s, k] * before
+        server[s, k] = loaded

@@ -1,0 +1,36 @@
+"""What pricing a launch gives: time, the terms it was made of, and the one that holds."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Price of one launch.
+
+    Parameters
+    ----------
+    stage, kernel : str
+    terms : dict of str to float
+        Cycles that each limit alone would take (see ``models.bounds``); ``launch`` comes on top of the largest.
+    cycles, milliseconds : float
+        Of the whole launch; NaN where only counts were asked for.
+    bound : str
+        The term that holds; ``balance`` (idle SMs) and ``tail`` (the last units) are seen by the schedule only.
+    occupancy : float
+        Share of the SM's warps that are resident, 0 for fixed function.
+    dram_bytes, l2_bytes : float
+        Moved to or from DRAM, and through L2.
+    details : dict of str to float
+        What else a fidelity has to say: ``busy_sms``, ``tail_cycles``, ``resident_blocks``.
+    """
+
+    stage: str
+    kernel: str
+    terms: dict[str, float]
+    cycles: float
+    milliseconds: float
+    bound: str
+    occupancy: float
+    dram_bytes: float
+    l2_bytes: float
+    details: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,136 @@
+"""Traffic: what the streams of a frame's launches move through L2 and to DRAM.
+
+Without a cache every byte of every transaction goes to DRAM. With an L2, a launch fetches the part of each buffer's
+footprint that no earlier launch of the frame left there; bytes beyond the footprint are read again and miss only by
+the share in which all footprints of the launch together exceed the cache. Stores stay in the cache until something
+pushes them out (write-back), and the launch that does so pays. What is in the cache is kept by buffer, least recently
+used first: a frame's launches hand whole buffers to each other, so buffers and not lines are what is reused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from models.events import MachineEvent
+from models.launch import Launch, Stream
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from models.fixed_function import PipeLaunch
+    from models.machine import Machine
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """Bytes of one launch.
+
+    Parameters
+    ----------
+    dram_bytes, l2_bytes : float
+    load_miss : float
+        Share of the bytes loaded that came from DRAM: it sets the latency of a load.
+    """
+
+    dram_bytes: float
+    l2_bytes: float
+    load_miss: float
+
+
+@dataclass
+class _Resident:
+    """Bytes of one buffer in the cache, and how many of them DRAM does not have yet."""
+
+    size: float
+    dirty: float
+
+
+def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[Traffic]:
+    """Bytes of each launch of a frame, in launch order.
+
+    Parameters
+    ----------
+    launches : sequence of Launch or PipeLaunch
+        All launches of the frame; the cache starts empty. A launch without streams moves the bytes of its events,
+        all of them through to DRAM.
+    machine : Machine
+    """
+    cache = _Cache(machine.memory.l2_bytes)
+    return [_launch_traffic(_streams(launch), cache) for launch in launches]
+
+
+def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:
+    """Return the streams of a launch; where it names none, one for its loads and one for its stores."""
+    if launch.streams or not isinstance(launch, Launch):
+        return launch.streams
+    totals = launch.events.sum(axis=0)
+    loads, stores = int(totals[MachineEvent.LOAD_BYTES]), int(totals[MachineEvent.STORE_BYTES])
+    name = f"{launch.stage}.{launch.kernel}"
+    return Stream(f"{name} loads", "load", loads, loads), Stream(f"{name} stores", "store", stores, stores)
+
+
+def _launch_traffic(streams: tuple[Stream, ...], cache: _Cache) -> Traffic:
+    moved = float(sum(stream.bytes for stream in streams))
+    if cache.capacity == 0:
+        return Traffic(moved, 0.0, 1.0)
+    working_set = sum(_footprints(streams).values())
+    again = max(0.0, 1.0 - cache.capacity / working_set) if working_set else 0.0  # reuse that misses
+    dram = loaded = missed = 0.0
+    for stream in streams:
+        footprint = min(stream.footprint_bytes, stream.bytes)
+        reuse = (stream.bytes - footprint) * again
+        fetched = 0.0 if stream.op == "store" else max(0.0, footprint - cache.holds(stream.buffer))
+        dram += fetched + reuse + cache.touch(stream.buffer, footprint, written=stream.op != "load")
+        if stream.op == "load":
+            loaded += stream.bytes
+            missed += fetched + reuse
+    return Traffic(dram, moved, missed / loaded if loaded else 0.0)
+
+
+def _footprints(streams: tuple[Stream, ...]) -> dict[str, int]:
+    """Footprint by buffer: the largest of its streams."""
+    sizes: dict[str, int] = {}
+    for stream in streams:
+        sizes[stream.buffer] = max(sizes.get(stream.buffer, 0), min(stream.footprint_bytes, stream.bytes))
+    return sizes
+
+
+class _Cache:
+    """Least recently used by buffer, write-back."""
+
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self._buffers: dict[str, _Resident] = {}  # oldest first
+
+    def holds(self, buffer: str) -> float:
+        """Bytes of the buffer that are in the cache."""
+        entry = self._buffers.get(buffer)
+        return entry.size if entry else 0.0
+
+    def touch(self, buffer: str, footprint: float, *, written: bool) -> float:
+        """Use a buffer; return the bytes that were written back to make room."""
+        entry = self._buffers.pop(buffer, _Resident(0.0, 0.0))
+        back = max(0.0, footprint - self.capacity) if written else 0.0  # what never fits goes through
+        entry.size = min(max(entry.size, footprint), self.capacity)
+        entry.dirty = min(max(entry.dirty, footprint), self.capacity) if written else entry.dirty
+        self._buffers[buffer] = entry
+        return back + self._evict()
+
+    def _evict(self) -> float:
+        """Push out the oldest bytes until all fits; return what had to be written."""
+        excess = sum(entry.size for entry in self._buffers.values()) - self.capacity
+        back = 0.0
+        for name in list(self._buffers):
+            if excess <= 0:
+                break
+            entry = self._buffers[name]
+            out = min(entry.size, excess)
+            written = entry.dirty * out / entry.size if entry.size else 0.0
+            back += written
+            entry.dirty -= written
+            entry.size -= out
+            excess -= out
+            if entry.size == 0:
+                del self._buffers[name]
+        return back
