@@ -16,7 +16,7 @@ Nets = NDArray[np.float64]
 def split_to_count(patches: Patches, count: int) -> Patches:
     """Split patches, the largest first, until there are exactly ``count``; the surface stays the same.
 
-    Every patch is cut in four as often as ``count`` allows, then the largest in four again, then one or two in two.
+    Every patch is cut in four as often as ``count`` allows, then the largest in four again, then one in two or three.
     The pieces of a patch stay together, in the patch's place.
     """
     nets = patches.points.astype(np.float64).reshape(-1, 4, 4, 4)
@@ -24,11 +24,11 @@ def split_to_count(patches: Patches, count: int) -> Patches:
         raise TilestampError(f"{len(nets)} patches cannot be split into {count}")
     while 4 * len(nets) <= count:
         nets = _split(nets, np.full(len(nets), 4))
-    quartered, halved = divmod(count - len(nets), 3)
+    quartered, rest = divmod(count - len(nets), 3)
     by_size = np.argsort(-_sizes(nets), kind="stable")
     parts = np.ones(len(nets), dtype=np.int64)
     parts[by_size[:quartered]] = 4
-    parts[by_size[quartered : quartered + halved]] = 2
+    parts[by_size[quartered : quartered + 1]] += rest
     return Patches(_split(nets, parts).reshape(-1, 16, 4).astype(np.float32))
 
 
@@ -61,7 +61,7 @@ def tessellate(patches: Patches, cells: int) -> Mesh:
 
 
 def _split(nets: Nets, parts: NDArray[np.int64]) -> Nets:
-    """Cut each patch into 1, 2 (along u) or 4 parts (u first), in place."""
+    """Cut each patch into 1, 2 (along u), 3 (a half and two quarters) or 4 parts (u first), in place."""
     first, second = (np.einsum("ij,prjk->prik", half, nets) for half in (FIRST_HALF, SECOND_HALF))
     quarters = [
         np.einsum("ij,pjck->pick", half, side) for half in (FIRST_HALF, SECOND_HALF) for side in (first, second)
@@ -69,6 +69,7 @@ def _split(nets: Nets, parts: NDArray[np.int64]) -> Nets:
     pieces = np.stack(quarters, axis=1)
     pieces[parts == 1, 0] = nets[parts == 1]
     pieces[parts == 2, 0], pieces[parts == 2, 1] = first[parts == 2], second[parts == 2]
+    pieces[parts == 3, 0], pieces[parts == 3, 2] = first[parts == 3], pieces[parts == 3, 3]
     kept: Nets = pieces[np.arange(4) < parts[:, None]]
     return kept
 

@@ -29,7 +29,7 @@ def read_mesh(path: str | Path) -> Mesh:
     Returns
     -------
     Mesh
-        Parts one after another; vertex colours, face colours (vertices are then not shared) or the materials' base
+        Parts one after another, in the order of the file; vertex colours, face colours (vertices are then not shared) or the materials' base
         colours; the file's normals, or area-weighted ones.
 
     Raises
@@ -44,9 +44,9 @@ def read_mesh(path: str | Path) -> Mesh:
         raise TilestampError(f"{path}: there is no such file")
     try:
         loaded = trimesh.load_scene(path, process=False)
-        parts = [
-            (loaded.geometry[loaded.graph[node][1]], loaded.graph[node][0]) for node in loaded.graph.nodes_geometry
-        ]
+        nodes = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
+        order = {name: number for number, name in enumerate(loaded.geometry)}
+        parts = [(loaded.geometry[name], matrix) for matrix, name in sorted(nodes, key=lambda node: order[node[1]])]
     except Exception as error:  # noqa: BLE001 (whatever a reader of broken bytes raises, the file is to blame)
         raise TilestampError(f"{path}: cannot be read as a mesh ({type(error).__name__}: {error})") from None
     meshes = [_part(part, matrix, path) for part, matrix in parts if len(getattr(part, "faces", ()))]
@@ -127,7 +127,9 @@ def _part(part: Any, matrix: Floats, path: Path) -> Mesh:
     if normals is not None and abs(np.linalg.det(linear)) > 0:
         normals = normals @ np.linalg.inv(linear)
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    return model_mesh(positions @ linear.T + matrix[:3, 3], triangles, colors, normals, path)
+    with np.errstate(invalid="ignore"):
+        placed = positions @ linear.T + matrix[:3, 3]
+    return model_mesh(placed, triangles, colors, normals, path)
 
 
 def _colors(part: Any) -> tuple[Floats | None, bool]:
