@@ -29,8 +29,8 @@ def read_mesh(path: str | Path) -> Mesh:
     Returns
     -------
     Mesh
-        Parts one after another, in the order of the file; vertex colours, face colours (vertices are then not shared) or the materials' base
-        colours; the file's normals, or area-weighted ones.
+        Parts one after another, in the order of the file; vertex colours, face colours (vertices are then not shared)
+        or the materials' base colours; the file's normals, or area-weighted ones.
 
     Raises
     ------
@@ -43,7 +43,8 @@ def read_mesh(path: str | Path) -> Mesh:
     if not path.is_file():
         raise TilestampError(f"{path}: there is no such file")
     try:
-        loaded = trimesh.load_scene(path, process=False)
+        with np.errstate(all="ignore"):  # numbers out of range are found, and named, below
+            loaded = trimesh.load_scene(path, process=False)
         nodes = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
         order = {name: number for number, name in enumerate(loaded.geometry)}
         parts = [(loaded.geometry[name], matrix) for matrix, name in sorted(nodes, key=lambda node: order[node[1]])]
