@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from models.errors import TilestampError
-from simulator.scenes import LookAt, ModelToClip, read_camera
+from simulator.scenes import LookAt, ModelToClip, Scene, read_camera
 from simulator.scenes.camera import fit_camera
+from simulator.scenes.scene import Patches
 
 
 def project(camera, point, width=400, height=300):
@@ -85,6 +86,13 @@ def test_a_view_is_found_by_name():
 def test_no_camera_is_the_default_view():
     view = ModelToClip(MATRIX)
     assert read_camera(None, {"default": view}) is view
+
+
+def test_a_scene_made_by_hand_has_a_default_view():
+    points = np.random.default_rng(7).normal(size=(2, 16, 4)).astype(np.float32)
+    points[..., 3] = 1
+    clip = points.reshape(-1, 4) @ read_camera(None, Scene("two", patches=Patches(points))).matrix(640, 480).T
+    assert (np.abs(clip[:, :3]) < clip[:, 3:]).all()
 
 
 def test_the_measured_cameras_are_read(shared):

@@ -9,13 +9,15 @@ import numpy as np
 
 from models.errors import TilestampError
 from simulator.scenes.camera import Camera, LookAt, ModelToClip
+from simulator.scenes.library import with_views
+from simulator.scenes.scene import Scene
 
 MATRIX_KEY = "model_to_clip"
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")
 FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...} or {"position", "forward", "up", ...}'
 
 
-def read_camera(source: Any = None, views: Mapping[str, Camera] | None = None) -> Camera:
+def read_camera(source: Any = None, scene: Scene | Mapping[str, Camera] | None = None) -> Camera:
     """Make a camera of anything that describes one.
 
     Parameters
@@ -24,8 +26,8 @@ def read_camera(source: Any = None, views: Mapping[str, Camera] | None = None) -
         A 4x4 matrix is model to clip space, row-major. A mapping has the key ``model_to_clip``, or ``eye, target, up,
         fov_degrees, near, far``, or ``position, forward, up, fov_degrees, near, far``. A string is a view's name or
         ``FILE.json``, ``FILE.json:KEY`` or ``FILE.json:KEY:INDEX``. None is the view ``default``.
-    views : mapping of str to Camera, optional
-        The scene's views.
+    scene : Scene or mapping of str to Camera, optional
+        Where views are looked up; a scene without a view ``default`` gets a fitted one.
 
     Returns
     -------
@@ -39,7 +41,7 @@ def read_camera(source: Any = None, views: Mapping[str, Camera] | None = None) -
     if source is None:
         source = "default"
     if isinstance(source, (str, Path)):
-        return _by_name(str(source), views or {})
+        return _by_name(str(source), with_views(scene).views if isinstance(scene, Scene) else scene or {})
     if isinstance(source, Mapping):
         return _from_mapping(source)
     if isinstance(source, (list, tuple, np.ndarray)):
