@@ -1,0 +1,74 @@
+"""Ru 2016: one thread a triangle, atomicMin on depth, an unprotected fragment write."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.scenes.scene import Scene
+from simulator.scenes.texture import texture_chains
+from simulator.scenes.textured_mesh import geometry
+from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
+from simulator.stages.ru2016.clear import clear
+from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
+from simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
+from simulator.stages.ru2016.tiled_raster import Visible
+from simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+
+
+def per_primitive(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    culling: bool = False,
+    race: bool = True,
+    perspective: bool = True,
+    texture_filter: Filter = "bilinear",
+    ssao: bool = False,
+) -> Frame:
+    """Draw a mesh triangle by triangle.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        See ``simulator.pipelines``.
+    culling : bool
+        Leave out triangles that face away; the original's basic path does not.
+    race : bool
+        Show what the unprotected writes leave (by the model of ``per_primitive_raster``); False: what was meant.
+    perspective : bool
+        Perspective-correct interpolation.
+    texture_filter : {"nearest", "bilinear"}
+    ssao : bool
+        Screen-space ambient occlusion.
+    """
+    mesh = geometry(scene)
+    chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
+    works = clear(width, height, 0, simt)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
+    drawable, assembly = primitive_assembly(mesh, vertices, simt)
+    meant, raced, raster = per_primitive_raster(
+        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=culling
+    )
+    works += [shading, assembly, raster]
+    wrong = raced.triangles != meant.triangles
+    visible = Visible(raced.triangles, meant.depth) if race else meant
+    fragments = interpolate(mesh, vertices, visible, perspective=perspective)
+    light = np.ones((height, width), np.float32)
+    if ssao:
+        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
+        works.append(occlusion)
+    image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
+    return Frame(
+        image,
+        meant.depth,
+        works + finish,
+        triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
+        maps={"pixels wrong by the race": wrong.astype(np.int64)},
+        facts={"pixels wrong by the race": int(wrong.sum()), "pixels drawn": int((meant.triangles >= 0).sum())},
+    )

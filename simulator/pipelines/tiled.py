@@ -1,0 +1,99 @@
+"""Ru 2016: triangles listed by tile, one block a tile, one thread a pixel."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.scenes.scene import Scene
+from simulator.scenes.texture import texture_chains
+from simulator.scenes.textured_mesh import geometry
+from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
+from simulator.stages.ru2016.clear import clear
+from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
+from simulator.stages.ru2016.tile_lists import Capacity, tile_lists
+from simulator.stages.ru2016.tiled_raster import tiled_raster
+from simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+
+TILES = range(4, 33)  # pixels on a side; 33x33 threads would be more than a block can have
+
+
+def tiled(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    tile: int = 8,
+    culling: bool = True,
+    capacity: Capacity = "safe",
+    perspective: bool = True,
+    texture_filter: Filter = "bilinear",
+    ssao: bool = False,
+) -> Frame:
+    """Draw a mesh by tiles.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        See ``simulator.pipelines``.
+    tile : int
+        Pixels on a side of a tile, 4 to 32.
+    culling : bool
+        Leave out triangles that face away.
+    capacity : {"safe", "original"}
+        Count, scan and fill the lists; or the original's room of a tenth of all triangles, which can overflow.
+    perspective : bool
+        Perspective-correct interpolation.
+    texture_filter : {"nearest", "bilinear"}
+    ssao : bool
+        Screen-space ambient occlusion.
+    """
+    if tile not in TILES:
+        raise TilestampError(f"a tile of the tiled pipeline has 4 to 32 pixels on a side, not {tile}")
+    check_choices(capacity=(capacity, ("safe", "original")), texture_filter=(texture_filter, ("nearest", "bilinear")))
+    mesh = geometry(scene)
+    chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
+    tiles = -(-width // tile) * -(-height // tile)
+    works = clear(width, height, tiles, simt)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
+    drawable, assembly = primitive_assembly(mesh, vertices, simt)
+    lists, listing, lost = tile_lists(
+        vertices.screen, mesh.triangles, drawable, width, height, simt, tile=tile, culling=culling, capacity=capacity
+    )
+    visible, raster = tiled_raster(vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile)
+    works += [shading, assembly, *listing, raster]
+    fragments = interpolate(mesh, vertices, visible, perspective=perspective)
+    light = np.ones((height, width), np.float32)
+    if ssao:
+        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
+        works.append(occlusion)
+    image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
+    sizes = np.diff(lists.starts)
+    return Frame(
+        image,
+        visible.depth,
+        works + finish,
+        triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
+        maps={"list length": sizes.reshape(-(-height // tile), -1)},
+        facts={
+            "tile": tile,
+            "list entries": int(sizes.sum()),
+            "longest list": int(sizes.max()),
+            "list entries lost by overflow": lost,
+            "triangles not drawn (behind the eye, or not finite)": len(scene.mesh.triangles) - len(drawable)
+            if scene.mesh
+            else 0,
+        },
+    )
+
+
+def check_choices(**options: tuple[Any, tuple[Any, ...]]) -> None:
+    """Refuse an option that is none of its choices."""
+    for name, (value, choices) in options.items():
+        if value not in choices:
+            raise TilestampError(f"{name} is {' or '.join(map(str, choices))}, not {value}")

@@ -1,0 +1,159 @@
+"""Textures as kernels read them: mip chains of all textures in one array, row-major or in small tiles, and their filters.
+
+Zhang keeps texels in "tile linear storage" so that a quad's texels share a cache line; his README gives no tile size,
+so 4x4 texels of 4 bytes (64 bytes, two sectors) are an assumption. Coordinates wrap (glTF's default, REPEAT).
+Sizes need not be powers of two: a level is half its parent, rounded down, by a box filter whose last row or column
+of an odd parent is dropped.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+TEXEL_BYTES = 4
+TILE = 4  # texels on a side of a storage tile: 64 bytes
+MAX_LEVELS = 16  # up to 32768 texels on a side
+_HALF = np.float32(0.5)
+_ONE = np.float32(1.0)
+
+
+class TextureChains(NamedTuple):
+    """All levels of all textures, for kernels.
+
+    Parameters
+    ----------
+    texels : ndarray, (T, 4), float32
+        RGBA in [0, 1]; a texel counts as 4 bytes (RGBA8) in memory traffic.
+    levels : ndarray, (textures, MAX_LEVELS, 3), int32
+        First texel, width, height of each level.
+    counts : ndarray, (textures,), int32
+        Levels of each texture.
+    tiled : int
+        1: tiles of 4x4 texels; 0: row after row.
+    """
+
+    texels: NDArray[np.float32]
+    levels: NDArray[np.int32]
+    counts: NDArray[np.int32]
+    tiled: int
+
+
+def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tiled: bool = False, mips: bool = True) -> TextureChains:
+    """Build the mip chains.
+
+    Parameters
+    ----------
+    textures : sequence of ndarray, (H, W, 4), uint8
+    tiled : bool
+        Layout of the texels in memory.
+    mips : bool
+        Whether to build levels below the first.
+    """
+    levels = np.zeros((max(1, len(textures)), MAX_LEVELS, 3), np.int32)
+    counts = np.ones(max(1, len(textures)), np.int32)
+    parts: list[NDArray[np.float32]] = []
+    first = 0
+    for t, texture in enumerate(textures):
+        image = texture.astype(np.float32) / np.float32(255.0)
+        chain = _chain(image) if mips else [image]
+        counts[t] = len(chain)
+        for k, level in enumerate(chain):
+            levels[t, k] = first, level.shape[1], level.shape[0]
+            parts.append(_stored(level, tiled))
+            first += len(parts[-1])
+    texels = np.concatenate(parts) if parts else np.ones((1, 4), np.float32)
+    return TextureChains(texels, levels, counts, int(tiled))
+
+
+def _chain(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+    """All levels down to one texel."""
+    chain = [image]
+    while max(chain[-1].shape[:2]) > 1 and len(chain) < MAX_LEVELS:
+        parent = chain[-1]
+        rows, columns = (max(1, size // 2) for size in parent.shape[:2])
+        step_r, step_c = min(2, parent.shape[0]), min(2, parent.shape[1])
+        blocks = parent[: rows * step_r, : columns * step_c].reshape(rows, step_r, columns, step_c, 4)
+        chain.append(blocks.mean(axis=(1, 3), dtype=np.float32))
+    return chain
+
+
+def _stored(level: NDArray[np.float32], tiled: bool) -> NDArray[np.float32]:
+    """A level's texels in memory order, (n, 4)."""
+    if not tiled:
+        return level.reshape(-1, 4)
+    rows, columns = (-(-size // TILE) for size in level.shape[:2])
+    padded = np.zeros((rows * TILE, columns * TILE, 4), np.float32)
+    padded[: level.shape[0], : level.shape[1]] = level
+    return padded.reshape(rows, TILE, columns, TILE, 4).swapaxes(1, 2).reshape(-1, 4)
+
+
+@njit(cache=True, nogil=True)
+def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> int:
+    """Where texel (x, y) of a level lies, in texels; x and y wrap."""
+    first = chains.levels[texture, level, 0]
+    width = chains.levels[texture, level, 1]
+    x = x % width
+    y = y % chains.levels[texture, level, 2]
+    if chains.tiled == 0:
+        return first + y * width + x
+    tile = (y // TILE) * ((width + TILE - 1) // TILE) + x // TILE
+    return first + tile * TILE * TILE + (y % TILE) * TILE + x % TILE
+
+
+@njit(cache=True, nogil=True)
+def nearest(chains: Any, texture: int, u: Any, v: Any, out: Any) -> None:
+    """Write the RGBA of the texel that (u, v) falls into, level 0, to ``out``."""
+    x = int(np.floor(u * np.float32(chains.levels[texture, 0, 1])))
+    y = int(np.floor(v * np.float32(chains.levels[texture, 0, 2])))
+    i = texel_index(chains, texture, 0, x, y)
+    for c in range(4):
+        out[c] = chains.texels[i, c]
+
+
+@njit(cache=True, nogil=True)
+def footprint(chains: Any, texture: int, level: int, u: Any, v: Any) -> tuple[int, int, Any, Any]:
+    """Lower left texel of the 2x2 texels around (u, v), and the weights of the right and upper ones."""
+    s = u * np.float32(chains.levels[texture, level, 1]) - _HALF
+    t = v * np.float32(chains.levels[texture, level, 2]) - _HALF
+    x = np.floor(s)
+    y = np.floor(t)
+    return int(x), int(y), s - x, t - y
+
+
+@njit(cache=True, nogil=True)
+def add_bilinear(chains: Any, texture: int, level: int, u: Any, v: Any, weight: Any, out: Any) -> None:
+    """Add ``weight`` times the bilinear value at (u, v) of one level to ``out``."""
+    x, y, fx, fy = footprint(chains, texture, level, u, v)
+    for dy in range(2):
+        wy = (fy if dy else _ONE - fy) * weight
+        for dx in range(2):
+            w = (fx if dx else _ONE - fx) * wy
+            i = texel_index(chains, texture, level, x + dx, y + dy)
+            for c in range(4):
+                out[c] += w * chains.texels[i, c]
+
+
+@njit(cache=True, nogil=True)
+def level_of_detail(chains: Any, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
+    """Automatic level: log2 of the longer of the two texel-space derivatives, in [0, last level]."""
+    width = np.float32(chains.levels[texture, 0, 1])
+    height = np.float32(chains.levels[texture, 0, 2])
+    along_x = dudx * width * dudx * width + dvdx * height * dvdx * height
+    along_y = dudy * width * dudy * width + dvdy * height * dvdy * height
+    longest = max(along_x, along_y)
+    if not longest > _ONE:
+        return np.float32(0.0)
+    return min(_HALF * np.log2(longest), np.float32(chains.counts[texture] - 1))
+
+
+@njit(cache=True, nogil=True)
+def add_trilinear(chains: Any, texture: int, lod: Any, u: Any, v: Any, out: Any) -> None:
+    """Add the trilinear value at (u, v): two levels around ``lod``, blended by its fraction."""
+    low = int(lod)
+    high = min(low + 1, chains.counts[texture] - 1)
+    blend = lod - np.float32(low)
+    add_bilinear(chains, texture, low, u, v, _ONE - blend, out)
+    add_bilinear(chains, texture, high, u, v, blend, out)

@@ -1,0 +1,183 @@
+"""Tiled raster: one block a tile, one thread a pixel (Ru 2016, "Tile-based rasterization").
+
+Every thread walks the tile's list and reads each whole primitive from global memory (no shared memory): three area
+evaluations, a depth test in registers, and where it is nearer the attributes are interpolated at once. The fragment is
+written once at the end. A tile smaller than a warp leaves lanes of it idle (4x4: half of them).
+
+Depth is interpolated linearly on the screen, in float32; equal depths keep the entry that came first.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from models.launch import Stream
+from models.simt import Simt
+from simulator.stages.ru2016.tile_lists import TileLists
+from simulator.stages.ru2016.triangle import area, barycentric, corners, inside
+from simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
+from simulator.work import Work
+
+FRAGMENT_BYTES = 60  # colour, eye position, eye normal, texture coordinate, texture pointer
+FAR = np.float32(1.0)
+_HALF = np.float32(0.5)
+_ONE = np.float32(1.0)
+_ZERO = np.float32(0.0)
+
+
+class TiledRasterEvent(IntEnum):
+    """Events of one block, that is of one tile."""
+
+    WARPS = 0
+    WARP_LANES = 1  # threads of the tile, off-screen ones included
+    TEST_WARPS = 2  # warp executions of the barycentric test: one for each warp and list entry
+    SAMPLE_TESTS = 3
+    SAMPLE_HITS = 4
+    HIT_WARPS = 5  # warp executions of the depth test
+    NEARER_WARPS = 6  # warp executions of the interpolation
+    NEARER_LANES = 7
+    ENTRIES = 8  # list entries: the dependent chain of the block
+    LOAD_TRANSACTIONS = 9
+    LOAD_BYTES = 10
+    STORE_TRANSACTIONS = 11
+    STORE_BYTES = 12
+
+
+class Visible(NamedTuple):
+    """The nearest triangle of each pixel.
+
+    Parameters
+    ----------
+    triangles : ndarray, (H, W), int32
+        -1 where there is none.
+    depth : ndarray, (H, W), float32
+        In [0, 1], 1 where there is none.
+    """
+
+    triangles: NDArray[np.int32]
+    depth: NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)
+def _tile(
+    screen: Any, triangles: Any, entries: Any, x_first: int, y_first: int, tile: int, warp: int,
+    visible: Any, depth: Any, marks: Any, row: Any,
+) -> None:  # fmt: skip
+    """Rasterize one tile's list; ``marks``, (2, warps), is scratch for the warps that hit and that come nearer."""
+    height, width = depth.shape
+    for t in entries:
+        x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
+        inverse = _ONE / area(x0, y0, x1, y1, x2, y2)
+        z0, z1, z2 = screen[triangles[t, 0], 2], screen[triangles[t, 1], 2], screen[triangles[t, 2], 2]
+        for y in range(tile):
+            py = np.float32(y_first + y) + _HALF
+            for x in range(tile):
+                px = np.float32(x_first + x) + _HALF
+                a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, px, py)
+                if not inside(a, b, c) or x_first + x >= width or y_first + y >= height:
+                    continue
+                z = a * z0 + b * z1 + c * z2
+                nearer = z >= _ZERO and z < depth[y_first + y, x_first + x]
+                if nearer:
+                    depth[y_first + y, x_first + x] = z
+                    visible[y_first + y, x_first + x] = t
+                if row is not None:
+                    w = (y * tile + x) // warp
+                    row[4] += 1  # SAMPLE_HITS
+                    marks[0, w] = 1
+                    if nearer:
+                        row[7] += 1  # NEARER_LANES
+                        marks[1, w] = 1
+        if row is not None:
+            for w in range(marks.shape[1]):
+                row[5] += marks[0, w]
+                row[6] += marks[1, w]
+                marks[0, w] = 0
+                marks[1, w] = 0
+
+
+@njit(cache=True, nogil=True)
+def _band(
+    screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any,
+    tile_row: int, events: Any,
+) -> None:  # fmt: skip
+    """Rasterize a row of tiles."""
+    columns = (depth.shape[1] + tile - 1) // tile
+    warps = (tile * tile + warp - 1) // warp
+    marks = np.zeros((2, warps), np.int64)
+    for column in range(columns):
+        i = tile_row * columns + column
+        listed = entries[starts[i] : starts[i + 1]]
+        row = None if events is None else events[i]
+        _tile(screen, triangles, listed, column * tile, tile_row * tile, tile, warp, visible, depth, marks, row)
+        if events is not None:
+            events[i, 0] = warps
+            events[i, 1] = tile * tile
+            events[i, 2] = warps * len(listed)
+            events[i, 3] = tile * tile * len(listed)
+            events[i, 8] = len(listed)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _tiled_raster(
+    screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any, events: Any
+) -> None:
+    for tile_row in prange((depth.shape[0] + tile - 1) // tile):
+        _band(screen, triangles, starts, entries, tile, warp, visible, depth, tile_row, events)
+
+
+def tiled_raster(
+    screen: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    lists: TileLists,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    tile: int,
+) -> tuple[Visible, Work]:
+    """Find the nearest triangle of each pixel.
+
+    Parameters
+    ----------
+    screen : ndarray, (V, 4), float32
+    triangles : ndarray, (F, 3), int32
+    lists : TileLists
+    width, height, tile : int
+        Pixels.
+    simt : Simt
+
+    Returns
+    -------
+    Visible, Work
+        One row of work a tile.
+    """
+    visible = Visible(np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.float32))
+    tiles = len(lists.starts) - 1
+    events = np.zeros((tiles, len(TiledRasterEvent)), np.int64)
+    _tiled_raster(screen, triangles, *lists, tile, simt.warp, *visible, events)
+    _add_traffic(events, simt, tile)
+    total = events.sum(axis=0)
+    drawn = len(np.unique(lists.entries))
+    streams = (
+        Stream("tile_lists", "load", 4 * len(lists.entries), 4 * len(lists.entries)),
+        Stream("primitives", "load", int(total[TiledRasterEvent.LOAD_BYTES]), drawn * PRIMITIVE_BYTES),
+        Stream("fragments", "store", int(total[TiledRasterEvent.STORE_BYTES]), width * height * (FRAGMENT_BYTES + 4)),
+    )
+    work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
+    return visible, work
+
+
+def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
+    """All lanes read the same words, so an entry's primitive costs its segments once a warp; fragments lie 60 bytes apart."""
+    segment = 128 if simt.coalescing == 2 else 32
+    reads = events[:, TiledRasterEvent.TEST_WARPS] * (-(-PRIMITIVE_BYTES // segment) + 1)  # the primitive, its number
+    rows = min(simt.warp, tile * tile) // min(simt.warp, tile)  # rows of the tile that a warp covers
+    writes = events[:, TiledRasterEvent.WARPS] * rows * (-(-tile * FRAGMENT_BYTES // segment) + 1)
+    events[:, TiledRasterEvent.LOAD_TRANSACTIONS] = reads
+    events[:, TiledRasterEvent.LOAD_BYTES] = reads * segment
+    events[:, TiledRasterEvent.STORE_TRANSACTIONS] = writes
+    events[:, TiledRasterEvent.STORE_BYTES] = writes * segment

@@ -1,0 +1,136 @@
+"""Vertex shading and primitive assembly (Ru 2016: "Vertex assembly and vertex shader", "Primitive assembly").
+
+One thread a vertex transforms it to the screen and to eye space; one thread an *index* then copies the whole vertex
+into its primitive. Both kernels run 128 threads a block. The original does not clip: a triangle with a vertex behind
+the eye (w <= 0) is garbage there and is dropped here, and counted.
+
+The pipeline is given one model-to-clip matrix; its rows give the eye's axes, since for a perspective without skew
+row 0 is the right axis, row 1 the up axis and row 3 the forward axis, each times a factor.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.scenes.textured_mesh import Geometry
+from simulator.stages.thread_per_item import Access, thread_per_item
+from simulator.work import Work
+
+BLOCK = 128  # threads
+VERTEX_BYTES = 64  # position, eye position, eye normal, texture coordinate, texture pointer and size
+PRIMITIVE_BYTES = 3 * VERTEX_BYTES + 4  # three vertices and a type
+_HALF = np.float32(0.5)
+_ONE = np.float32(1.0)
+
+
+class EyeSpace(NamedTuple):
+    """What the model-to-clip matrix says about the eye.
+
+    Parameters
+    ----------
+    axes : ndarray, (3, 3), float32
+        Right, up and backward axis in model space, unit length.
+    scales : ndarray, (3,), float32
+        Lengths of rows 0, 1 and 3 of the matrix: clip = scale x eye coordinate. The last is 0 for a parallel projection.
+    """
+
+    axes: NDArray[np.float32]
+    scales: NDArray[np.float32]
+
+
+class ShadedVertices(NamedTuple):
+    """The vertex buffer after shading.
+
+    Parameters
+    ----------
+    screen : ndarray, (V, 4), float32
+        Pixels right and down, depth in [0, 1], 1/w; w itself is not positive where 1/w is 0.
+    normals : ndarray, (V, 3), float32
+        In eye space.
+    """
+
+    screen: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+def eye_space(matrix: NDArray[Any]) -> EyeSpace:
+    """Take the eye's axes out of a model-to-clip matrix, (4, 4)."""
+    rows = np.asarray(matrix, np.float64)[[0, 1, 3], :3]
+    scales = np.linalg.norm(rows, axis=1)
+    axes = rows / np.where(scales > 0.0, scales, 1.0)[:, None]
+    axes[2] = -axes[2] if scales[2] > 1e-12 else np.cross(axes[0], axes[1])
+    return EyeSpace(axes.astype(np.float32), np.where(scales > 1e-12, scales, 0.0).astype(np.float32))
+
+
+@njit(cache=True, nogil=True)
+def _vertex_shading(
+    positions: Any, normals: Any, matrix: Any, axes: Any, width: Any, height: Any, screen: Any, eye_normals: Any
+) -> None:
+    """Transform every vertex."""
+    for v in range(len(positions)):
+        x, y, z, w0 = positions[v, 0], positions[v, 1], positions[v, 2], positions[v, 3]
+        cx = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3] * w0
+        cy = matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3] * w0
+        cz = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3] * w0
+        w = matrix[3, 0] * x + matrix[3, 1] * y + matrix[3, 2] * z + matrix[3, 3] * w0
+        inverse = _ONE / w if w > np.float32(0.0) else np.float32(0.0)
+        screen[v, 0] = (cx * inverse + _ONE) * _HALF * width
+        screen[v, 1] = (_ONE - cy * inverse) * _HALF * height
+        screen[v, 2] = (cz * inverse + _ONE) * _HALF
+        screen[v, 3] = inverse
+        for k in range(3):
+            eye_normals[v, k] = axes[k, 0] * normals[v, 0] + axes[k, 1] * normals[v, 1] + axes[k, 2] * normals[v, 2]
+
+
+def vertex_shading(
+    mesh: Geometry, matrix: NDArray[Any], width: int, height: int, simt: Simt
+) -> tuple[ShadedVertices, Work]:
+    """Transform vertices to the screen, normals to eye space.
+
+    Parameters
+    ----------
+    mesh : Geometry
+    matrix : ndarray, (4, 4)
+        Model to clip.
+    width, height : int
+        Pixels.
+    simt : Simt
+
+    Returns
+    -------
+    ShadedVertices, Work
+    """
+    count = len(mesh.positions)
+    out = ShadedVertices(np.empty((count, 4), np.float32), np.empty((count, 3), np.float32))
+    _vertex_shading(
+        mesh.positions,
+        mesh.normals,
+        np.ascontiguousarray(matrix, np.float32),
+        eye_space(matrix).axes,
+        np.float32(width),
+        np.float32(height),
+        *out,
+    )
+    loads = (Access("positions", 12, 3), Access("normals", 12, 3), Access("uvs", 8, 2))
+    stores = (Access("vertices", VERTEX_BYTES, VERTEX_BYTES // 4),)
+    return out, thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, loads, stores)
+
+
+def primitive_assembly(mesh: Geometry, vertices: ShadedVertices, simt: Simt) -> tuple[NDArray[np.int32], Work]:
+    """Copy each index's vertex into its primitive; drop what the original cannot draw.
+
+    Returns
+    -------
+    drawable : ndarray, (F',), int32
+        Triangles whose vertices are all before the eye, in order.
+    Work
+    """
+    before = (vertices.screen[:, 3] > 0.0)[mesh.triangles].all(axis=1)
+    loads = (Access("indices", 4, 1), Access("vertices", VERTEX_BYTES, VERTEX_BYTES // 4))
+    stores = (Access("primitives", PRIMITIVE_BYTES // 3, VERTEX_BYTES // 4),)
+    indices = 3 * len(mesh.triangles)
+    work = thread_per_item("primitive_assembly", "primitive_assembly", indices, BLOCK, simt, loads, stores)
+    return np.flatnonzero(before).astype(np.int32), work

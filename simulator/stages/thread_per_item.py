@@ -1,0 +1,95 @@
+"""Kernels of one thread an item and the same work for each: vertex shading, copies, clears. Their work table by block."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from models.coalescing import transactions
+from models.launch import Stream
+from models.simt import Simt
+from simulator.work import Work
+
+
+class ThreadEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0  # warps that run the body
+    WARP_LANES = 1  # their lanes that have an item
+    LOAD_TRANSACTIONS = 2
+    STORE_TRANSACTIONS = 3
+    LOAD_BYTES = 4
+    STORE_BYTES = 5
+
+
+class Access(NamedTuple):
+    """How the items of a kernel touch one buffer.
+
+    Parameters
+    ----------
+    buffer : str
+    stride : int
+        Bytes from one item's record to the next one's.
+    words : int
+        Memory instructions that read or write the record.
+    word_bytes : int
+        Bytes of each: 4, 8 or 16.
+    """
+
+    buffer: str
+    stride: int
+    words: int
+    word_bytes: int = 4
+
+
+def thread_per_item(
+    stage: str,
+    kernel: str,
+    items: int,
+    block: int,
+    simt: Simt,
+    loads: tuple[Access, ...] = (),
+    stores: tuple[Access, ...] = (),
+) -> Work:
+    """Make the work table of a kernel whose thread i handles item i.
+
+    Parameters
+    ----------
+    stage, kernel : str
+    items : int
+    block : int
+        Threads in a block.
+    simt : Simt
+    loads, stores : tuple of Access
+
+    Returns
+    -------
+    Work
+        One row a block.
+    """
+    blocks = max(1, -(-items // block))
+    lanes = np.full(blocks, block, np.int64)
+    lanes[-1] = items - (blocks - 1) * block
+    warps = -(-lanes // simt.warp)
+    table = np.zeros((blocks, len(ThreadEvent)), np.int64)
+    table[:, ThreadEvent.WARPS] = warps
+    table[:, ThreadEvent.WARP_LANES] = lanes
+    streams = []
+    for op, accesses in (("load", loads), ("store", stores)):
+        for access in accesses:
+            count, size = record_transactions(access, simt)
+            table[:, ThreadEvent[f"{op.upper()}_TRANSACTIONS"]] += warps * count
+            table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
+            streams.append(Stream(access.buffer, op, int(warps.sum()) * size, items * access.stride))  # type: ignore[arg-type]
+    return Work(stage, kernel, ThreadEvent, table, blocks, block, streams=tuple(streams))
+
+
+def record_transactions(access: Access, simt: Simt) -> tuple[int, int]:
+    """Transactions of a whole warp on consecutive records, and their bytes."""
+    count = total = 0
+    for word in range(access.words):
+        addresses = np.arange(simt.warp, dtype=np.int64) * access.stride + word * access.word_bytes
+        n, size = transactions(addresses, simt.warp, access.word_bytes, int(simt.coalescing))
+        count += n
+        total += size
+    return count, total
