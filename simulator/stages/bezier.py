@@ -33,29 +33,96 @@ def restriction(a, b, rows):
 
 
 @njit(cache=True, nogil=True)
+def basis(first, side, rows, slopes):
+    """Bernstein polynomials at four evenly spaced parameters of the interval [first * side, (first + 1) * side].
+
+    Parameters
+    ----------
+    first : int
+    side : float32
+        A power of two, so that the ends of the unit interval are exact.
+    rows : ndarray, (4, 4), float32
+        Filled: ``rows[x, k]`` weighs control point x at parameter k.
+    slopes : ndarray, (3, 4), float32
+        Filled: ``slopes[x, k]`` weighs the difference of control points x + 1 and x in a third of the derivative.
+    """
+    for k in range(4):
+        a = np.float32(3 * first + k) * side / THREE
+        A = ONE - a
+        rows[0, k], rows[1, k], rows[2, k], rows[3, k] = A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
+        slopes[0, k], slopes[1, k], slopes[2, k] = A * A, TWO * a * A, a * a
+
+
+@njit(cache=True, nogil=True)
+def _along_v(points, by_v, between):
+    """Contract the rows of one coordinate of a net: ``between[4 r + x]``."""
+    for r in range(4):
+        for x in range(4):
+            between[4 * r + x] = (
+                by_v[0, r] * points[x]
+                + by_v[1, r] * points[4 + x]
+                + by_v[2, r] * points[8 + x]
+                + by_v[3, r] * points[12 + x]
+            )
+
+
+@njit(cache=True, nogil=True)
+def _along_u(between, by_u, out):
+    """Contract the columns: ``out[4 r + c]``."""
+    for r in range(4):
+        for c in range(4):
+            out[4 * r + c] = (
+                by_u[0, c] * between[4 * r]
+                + by_u[1, c] * between[4 * r + 1]
+                + by_u[2, c] * between[4 * r + 2]
+                + by_u[3, c] * between[4 * r + 3]
+            )
+
+
+@njit(cache=True, nogil=True)
 def restrict(points, by_u, by_v, between, out):
-    """Control points of a sub-patch, ``out`` (3, 16), from ``points`` (3, 16) and two ``restriction`` tables."""
-    for d in range(3):
+    """Tensor product: control points of a sub-patch by ``restriction`` tables, points of a grid by ``basis`` tables.
+
+    Parameters
+    ----------
+    points : ndarray, (>= D, 16), float32
+        Control net, a coordinate a row.
+    by_u, by_v : ndarray, (4, 4), float32
+    between : ndarray, (16,), float32
+        Scratch.
+    out : ndarray, (D, 16), float32
+    """
+    for d in range(out.shape[0]):
+        _along_v(points[d], by_v, between)
+        _along_u(between, by_u, out[d])
+
+
+@njit(cache=True, nogil=True)
+def tangents(points, by_u, by_v, slope_u, slope_v, between, along_u, along_v):
+    """Thirds of the derivatives along u and v on a grid, (>= D, 16) each, D the rows of ``points``.
+
+    Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
+    """
+    for d in range(points.shape[0]):
+        net = points[d]
+        _along_v(net, by_v, between)
+        for r in range(4):
+            q = 4 * r
+            d0, d1, d2 = between[q + 1] - between[q], between[q + 2] - between[q + 1], between[q + 3] - between[q + 2]
+            for c in range(4):
+                along_u[d, q + c] = slope_u[0, c] * d0 + slope_u[1, c] * d1 + slope_u[2, c] * d2
         for r in range(4):
             for x in range(4):
                 between[4 * r + x] = (
-                    by_v[0, r] * points[d, x]
-                    + by_v[1, r] * points[d, 4 + x]
-                    + by_v[2, r] * points[d, 8 + x]
-                    + by_v[3, r] * points[d, 12 + x]
+                    slope_v[0, r] * (net[4 + x] - net[x])
+                    + slope_v[1, r] * (net[8 + x] - net[4 + x])
+                    + slope_v[2, r] * (net[12 + x] - net[8 + x])
                 )
-        for r in range(4):
-            for c in range(4):
-                out[d, 4 * r + c] = (
-                    by_u[0, c] * between[4 * r]
-                    + by_u[1, c] * between[4 * r + 1]
-                    + by_u[2, c] * between[4 * r + 2]
-                    + by_u[3, c] * between[4 * r + 3]
-                )
+        _along_u(between, by_u, along_v[d])
 
 
 def screen_points(points: NDArray[np.float32], matrix: ArrayLike, width: int, height: int) -> NDArray[np.float32]:
-    """Control points as (x w, y w, w), x and y in pixels from the top left corner.
+    """Control points as (x w, y w, w, z w), x and y in pixels from the top left corner, z in [-1, 1] where visible.
 
     Parameters
     ----------
@@ -68,7 +135,7 @@ def screen_points(points: NDArray[np.float32], matrix: ArrayLike, width: int, he
 
     Returns
     -------
-    ndarray, (P, 3, 16), float32
+    ndarray, (P, 4, 16), float32
         Rounded once, after the transformation in float64.
 
     Raises
@@ -76,7 +143,7 @@ def screen_points(points: NDArray[np.float32], matrix: ArrayLike, width: int, he
     TilestampError
         NaN, infinity, or numbers that float32 does not hold.
     """
-    viewport = np.array([[0.5 * width, 0, 0, 0.5 * width], [0, -0.5 * height, 0, 0.5 * height], [0, 0, 0, 1.0]])
+    viewport = np.array([[0.5 * width, 0, 0, 0.5 * width], [0, -0.5 * height, 0, 0.5 * height], [0, 0, 0, 1.0], [0, 0, 1, 0]])
     rows = viewport @ np.asarray(matrix, np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         screen = np.ascontiguousarray((rows @ points.astype(np.float64).transpose(0, 2, 1)).astype(np.float32))

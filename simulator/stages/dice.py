@@ -1,0 +1,250 @@
+"""Dice: every sub-patch becomes a 4x4 grid of shaded vertices (Eisenacher & Loop 2010, section 3).
+
+"Then we evaluate a 4x4 grid for each sub-patch and shade the vertices. Position and color are written to a VBO." Like
+the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch. The kernel here evaluates a grid as a
+tensor product instead, rows first, which changes no count.
+
+A vertex is 16 bytes: x, y in pixels from the top left corner, depth z/w, and the colour as RGBA8 in the bits of the
+fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from models.coalescing import transactions
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.stages.bezier import basis, restrict, screen_points, tangents
+from simulator.stages.bound_and_split import SubPatches
+from simulator.stages.shading import NUDGE, Grid, _set_normals, has_normal, lighting, shade
+from simulator.work import Work
+
+BLOCK = 256  # threads, a vertex each: 16 sub-patches
+VERTICES = 16  # of a grid
+CHUNK = 256  # sub-patches that one call of the worker takes
+VERTEX_BYTES = 16
+POINT_BYTES = 16  # a homogeneous control point
+ENTRY_BYTES = 8  # of the patch queue
+BOX_BYTES = 16
+
+
+class DiceEvent(IntEnum):
+    """Events of one block: 16 sub-patches, a thread a vertex."""
+
+    VERTEX_WARPS = 0  # warps that evaluate, shade and store a vertex a lane
+    VERTEX_LANES = 1
+    PATCHES = 2  # sub-patches
+    LOAD_TRANSACTIONS = 3  # queue entry, and each lane one control point of its patch into shared memory
+    LOAD_BYTES = 4
+    STORE_TRANSACTIONS = 5  # vertices, and a box a sub-patch
+    STORE_BYTES = 6
+    TEXTURE_LANES = 7  # texels fetched
+
+
+class Grids(NamedTuple):
+    """Diced sub-patches, in the order of the queue."""
+
+    vertices: NDArray[np.float32]  # (N, 16, 4) x, y in pixels, z/w, RGBA8 bits; vertex 4 * row + column
+    boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the 16 vertices
+
+
+_E = DiceEvent
+
+
+@njit(cache=True, nogil=True)
+def _new_grid():
+    """Scratch for one grid of a patch without weights: w = 1 everywhere."""
+    f = np.float32
+    grid = Grid(
+        np.empty((4, 4), f),
+        np.empty((4, 4), f),
+        np.empty((3, 4), f),
+        np.empty((3, 4), f),
+        np.empty(16, f),
+        np.empty((4, 16), f),
+        np.ones((4, 16), f),
+        np.zeros((4, 16), f),
+        np.zeros((4, 16), f),
+        np.empty((4, 16), f),
+        np.empty((2, 16), f),
+    )
+    return grid
+
+
+@njit(cache=True, nogil=True)
+def _set_tables(grid, first_u, first_v, side):
+    basis(first_u, side, grid.by_u, grid.slope_u)
+    basis(first_v, side, grid.by_v, grid.slope_v)
+
+
+@njit(cache=True, nogil=True)
+def _evaluate(grid, net, dimensions):
+    """Points, tangents and normals of a grid from the control net (D, 16) of its patch."""
+    restrict(net, grid.by_u, grid.by_v, grid.between, grid.point[:dimensions])
+    tangents(net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.along_u, grid.along_v)
+    _set_normals(grid)
+
+
+@njit(cache=True, nogil=True)
+def _borrow_normal(grid, net, first_u, first_v, side, spare):
+    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
+    for k in range(VERTICES):
+        if has_normal(grid, k):
+            continue
+        middle = np.float32(0.5)
+        u = np.float32(3 * first_u + (k & 3)) * side / np.float32(3)
+        v = np.float32(3 * first_v + (k >> 2)) * side / np.float32(3)
+        # a grid of no size at the place: all its 16 vertices are that point
+        _set_point_tables(spare, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE)
+        _evaluate(spare, net, net.shape[0])
+        grid.normal[:, k] = spare.normal[:, 0]
+
+
+@njit(cache=True, nogil=True)
+def _set_point_tables(grid, u, v):
+    """Tables of one parameter in the first column."""
+    for table, slopes, a in ((grid.by_u, grid.slope_u, u), (grid.by_v, grid.slope_v, v)):
+        A = np.float32(1) - a
+        table[:] = np.float32(0)
+        slopes[:] = np.float32(0)
+        table[0, 0], table[1, 0] = A * A * A, np.float32(3) * a * A * A
+        table[2, 0], table[3, 0] = np.float32(3) * a * a * A, a * a * a
+        slopes[0, 0], slopes[1, 0], slopes[2, 0] = A * A, np.float32(2) * a * A, a * a
+
+
+@njit(cache=True, nogil=True)
+def _store_grid(screen, vertices, box):
+    """Project 16 vertices, and bound them."""
+    x0 = y0 = np.float32(np.inf)
+    x1 = y1 = np.float32(-np.inf)
+    for k in range(VERTICES):
+        scale = np.float32(1) / screen[2, k]
+        x, y = screen[0, k] * scale, screen[1, k] * scale
+        vertices[k, 0], vertices[k, 1], vertices[k, 2] = x, y, screen[3, k] * scale
+        x0, x1 = min(x0, x), max(x1, x)
+        y0, y1 = min(y0, y), max(y1, y)
+    box[0], box[1], box[2], box[3] = x0, y0, x1, y1
+
+
+@njit(cache=True, nogil=True)
+def _dice_chunk(start, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes):
+    """Dice the sub-patches start..stop-1."""
+    grid = _new_grid()
+    spare = _new_grid()
+    color = np.empty(VERTICES, np.uint32)
+    for n in range(start, stop):
+        patch, i, j = subpatches.patch[n], np.int64(subpatches.i[n]), np.int64(subpatches.j[n])
+        side = np.float32(1) / np.float32(1 << subpatches.level[n])
+        _set_tables(grid, i, j, side)
+        restrict(screen[patch], grid.by_u, grid.by_v, grid.between, grid.screen)
+        _store_grid(grid.screen, vertices[n], boxes[n])
+        _evaluate(grid, nets[patch], nets.shape[1])
+        _borrow_normal(grid, nets[patch], i, j, side, spare)
+        shade(grid, light, texture, i, j, side, color)
+        for k in range(VERTICES):
+            colors[n, k, 3] = color[k]
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _dice(subpatches, nets, screen, light, texture, vertices, colors, boxes):
+    for chunk in prange(-(-boxes.shape[0] // CHUNK)):
+        stop = min((chunk + 1) * CHUNK, boxes.shape[0])
+        _dice_chunk(chunk * CHUNK, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes)
+
+
+def dice(
+    points: NDArray[np.float32],
+    subpatches: SubPatches,
+    matrix: ArrayLike,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    texture: NDArray[np.uint8] | None = None,
+    counting: bool = True,
+) -> tuple[Grids, list[Work]]:
+    """Evaluate and shade a 4x4 grid for each sub-patch.
+
+    Parameters
+    ----------
+    points : ndarray, (P, 16, 4), float32
+        Homogeneous control points (wx, wy, wz, w) of the urPatches.
+    subpatches : SubPatches
+    matrix : array-like, (4, 4)
+        Model to clip space, for column vectors.
+    width, height : int
+        Pixels.
+    simt : Simt
+    texture : ndarray, (H, W, 3 or 4), uint8, optional
+        Laid over each urPatch, u to the right and v down; a solid checker if not given.
+    counting : bool
+        Without it no works come back.
+
+    Returns
+    -------
+    grids : Grids
+    works : list of Work
+        One, a row a block.
+
+    Raises
+    ------
+    TilestampError
+        A texture of another shape or type, or numbers that are not finite.
+    """
+    if texture is not None and (texture.ndim != 3 or texture.shape[2] not in (3, 4) or texture.dtype != np.uint8):
+        raise TilestampError(f"texture must be (H, W, 3 or 4) bytes, not {texture.dtype} of shape {texture.shape}")
+    dimensions = 3 if (points[..., 3] == 1).all() else 4
+    nets = np.ascontiguousarray(points[..., :dimensions].transpose(0, 2, 1))
+    screen = screen_points(points, matrix, width, height)
+    number = len(subpatches.patch)
+    vertices = np.empty((number, VERTICES, 4), np.float32)
+    grids = Grids(vertices, np.empty((number, 4), np.float32))
+    light = lighting(points, matrix)
+    _dice(subpatches, nets, screen, light, texture, vertices, vertices.view(np.uint32), grids.boxes)
+    return grids, [_dice_work(number, len(points), texture is not None, simt)] if counting else []
+
+
+def _dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
+    """Work of dicing: nothing depends on the data, but that the last block may be partly empty."""
+    per_block = BLOCK // VERTICES
+    grids = np.minimum(per_block, number - per_block * np.arange(-(-number // per_block)))
+    table = np.zeros((len(grids), len(_E)), np.int64)
+    table[:, _E.PATCHES] = grids
+    table[:, _E.VERTEX_LANES] = grids * VERTICES
+    table[:, _E.VERTEX_WARPS] = -(-grids * VERTICES // simt.warp)
+    table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
+    for count in np.unique(grids):
+        loads, stores = _block_traffic(int(count), simt)
+        table[grids == count, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = loads
+        table[grids == count, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = stores
+    moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
+    entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
+    streams = (
+        Stream("queue", "load", entries, entries),
+        Stream("points", "load", moved - entries, patches * VERTICES * POINT_BYTES),
+        Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES),
+        Stream("boxes", "store", boxes, boxes),
+    )
+    return Work("dice", "dice", _E, table, len(table), BLOCK, VERTICES * POINT_BYTES * per_block, streams=streams)
+
+
+def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Transactions and bytes of a block's loads, and of its stores.
+
+    Half-warps read different patches, whose 256 bytes never share a segment with another patch.
+    """
+    loads, stores = np.zeros(2, np.int64), np.zeros(2, np.int64)
+    for first in range(0, grids * VERTICES, simt.warp):
+        lanes = min(simt.warp, grids * VERTICES - first)
+        lane = np.arange(first, first + lanes)
+        whole = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, simt.coalescing)
+        entry = transactions(lane // VERTICES * ENTRY_BYTES, lanes, ENTRY_BYTES, simt.coalescing)
+        box = np.where(lane % VERTICES == 0, lane // VERTICES * BOX_BYTES, -1)
+        loads += np.add(whole, entry)
+        stores += np.add(whole, transactions(box, lanes, BOX_BYTES, simt.coalescing))
+    return loads, stores
