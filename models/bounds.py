@@ -8,6 +8,7 @@ latency   Little's law: dependent chains of all units / units that are resident 
 dram, l2  bytes / bandwidth
 atomic    requests and conflicts / rate of all atomic units
 queue     requests at the fullest atomic unit: contention
+balance   where the blocks are fewer than the SMs: the fullest of issue, shared and l1 on the SMs that get any
 start     blocks / block launch rate
 launch    overhead of the kernel
 ========  ===========================================================================================================
@@ -50,13 +51,16 @@ def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
 def bound_terms(launch: Launch, machine: Machine, asked: Demand, held: Residency) -> dict[str, float]:
     """Cycles of each term."""
     sms = machine.sm.count
-    resident = max(1, min(len(asked.alone), int(slots(launch, machine, held).sum())))
+    units = len(asked.alone)
+    places = slots(launch, machine, held)
+    resident = max(1, min(units, int(places.sum())))
+    busy = max(1, min(units, int(np.count_nonzero(places))))
     blocks = launch.grid if launch.dispatch == "blocks" else 0
+    local = {"issue": asked.issue.sum(), "shared": asked.shared.sum(), "l1": asked.l1.sum()}
     return {
-        "issue": float(asked.issue.sum()) / sms,
-        "shared": float(asked.shared.sum()) / sms,
-        "l1": float(asked.l1.sum()) / sms,
-        "latency": float(asked.alone.sum()) / resident,
+        **{name: float(cycles) / sms for name, cycles in local.items()},
+        "balance": float(max(local.values())) / busy if busy < sms else 0.0,
+        "latency": float(asked.chain.sum()) / resident,
         "dram": float(asked.dram.sum()),
         "l2": float(asked.l2.sum()),
         "atomic": float(asked.atomic.sum()),

@@ -10,8 +10,8 @@ dram, l2    the chip's bandwidths: its share of the launch's bytes
 atomic      the chip's atomic units together: requests, and lanes that conflict
 queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there
 
-and cannot finish before its ``alone`` time: the round trips of its dependent chain, or its own instructions when too
-few warps share them among the schedulers.
+and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, or its own instructions when
+its warps are too few for all schedulers.
 """
 
 from dataclasses import dataclass
@@ -38,6 +38,8 @@ class Demand:
         On the unit's own SM.
     dram, l2, atomic, queue : ndarray
         Of the whole chip.
+    chain : ndarray
+        Round trips that the unit waits for, one after another.
     alone : ndarray
         What the unit takes with the machine to itself.
     """
@@ -49,6 +51,7 @@ class Demand:
     l2: Cycles
     atomic: Cycles
     queue: Cycles
+    chain: Cycles
     alone: Cycles
 
 
@@ -70,9 +73,10 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     passes = (events[:, E.SHARED] + events[:, E.SHARED_ATOMIC]) * groups + events[:, E.BANK_REPLAYS]
     bytes_moved = events[:, E.LOAD_BYTES] + events[:, E.STORE_BYTES]
     share = _shares(bytes_moved)
+    chain = _chain(launch, machine, moved)
     l2_cycles = moved.l2_bytes / memory.l2_bytes_per_clock if memory.l2_bytes else 0.0
-    one_warp_of = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
-    spread = machine.sm.schedulers / min(machine.sm.schedulers, one_warp_of)
+    warps = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
+    spread = machine.sm.schedulers / min(machine.sm.schedulers, warps)
     return Demand(
         issue=issue,
         shared=passes * memory.bank_pass_cycles,
@@ -81,7 +85,8 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
         l2=share * l2_cycles,
         atomic=_atomic(events, machine),
         queue=_shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine),
-        alone=np.maximum(_chain(launch, machine, moved), issue * spread),
+        chain=chain,
+        alone=np.maximum(chain, issue * spread),
     )
 
 

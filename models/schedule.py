@@ -111,63 +111,69 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
     """Play all units; return the end, the start of the last unit (cycles), and the SMs that got any.
 
     ``ends[s, p]`` is the reading of SM s's own clock at which the unit in place p ends, infinite where it is free.
-    ``now`` is unstretched time, ``time`` is real; ``wake[s]`` is the ``now`` of the next end on SM s.
+    ``now`` is unstretched time, ``time`` is real; ``wake[s]`` is the ``now`` of the next end on SM s, and ``first``
+    a tournament tree over it.
     """
     sms = len(places)
-    most = max(1, places.max())
-    ends = np.full((sms, most), np.inf)
-    unit = np.zeros((sms, most), np.int64)
+    ends = np.full((sms, max(1, places.max())), np.inf)
+    unit = np.zeros(ends.shape, np.int64)
     free = places.copy()
     load = np.zeros(sms)  # S of each SM
     clock = np.zeros(sms)  # its own clock, at ``read``
     read = np.zeros(sms)
-    wake = np.full(sms, np.inf)
+    leaves = 1 << int(np.ceil(np.log2(max(2, sms))))
+    wake = np.full(leaves, np.inf)
+    first = _tournament(leaves)
     server = np.zeros((sms, SERVERS))  # what the units of an SM load the chip with, at their own pace
     chip_load = np.zeros(SERVERS)
-    used = np.zeros(sms, np.bool_)
     vacant = free.sum()
     time = 0.0
     now = 0.0
     last_start = 0.0
     started = 0
     ended = 0
+    freed = 0  # SM of the last end
     while ended < len(alone):
-        stretch = max(1.0, chip_load.max())
-        s = np.argmin(wake)
+        stretch = max(1.0, chip_load[0], chip_load[1], chip_load[2], chip_load[3])
+        s = first[1]
+        moment = wake[s]
         start = False
         if started < len(alone) and vacant > 0:
             ready = now + max(0.0, started * interval - time) / stretch
-            start = ready <= wake[s]
-        moment = ready if start else wake[s]
+            start = ready <= moment
+            moment = min(ready, moment)
         time += (moment - now) * stretch
         now = moment
         if start:
-            s = np.argmax(free)
+            s = freed if vacant == 1 and ended > 0 else np.argmax(free)
         # the SM's own clock up to now, before its load changes
         clock[s] += (now - read[s]) / max(1.0, load[s])
         read[s] = now
         if start:
-            place = np.argmax(ends[s, : places[s]])
+            place = _free_place(ends, s, places[s])
             i = started
             ends[s, place] = clock[s] + alone[i]
             unit[s, place] = i
             started += 1
             last_start = time
-            used[s] = True
-            sign = 1.0
+            _change(s, i, 1.0, sm, chip, alone, load, server, chip_load)
+            free[s] -= 1
+            vacant -= 1
         else:
-            place = np.argmin(ends[s])
+            place = _next_end(ends, s, places[s])
             i = unit[s, place]
             ends[s, place] = np.inf
             ended += 1
-            sign = -1.0
-        _change(s, i, sign, sm, chip, alone, load, server, chip_load)
-        free[s] -= int(sign)
-        vacant -= int(sign)
+            _change(s, i, -1.0, sm, chip, alone, load, server, chip_load)
+            free[s] += 1
+            vacant += 1
+            freed = s
         if free[s] == places[s]:  # empty: leave no rounding behind
             load[s] = 0.0
-        wake[s] = now + max(0.0, ends[s].min() - clock[s]) * max(1.0, load[s])
-    return time, last_start, used.sum()
+        left = ends[s, _next_end(ends, s, places[s])] - clock[s]
+        wake[s] = now + max(0.0, left) * max(1.0, load[s])
+        _replay(first, wake, leaves, s)
+    return time, last_start, min(len(alone), int(np.count_nonzero(places)))
 
 
 @njit(cache=True, nogil=True)
@@ -176,9 +182,51 @@ def _change(
 ) -> None:
     """Add (or take away) unit i to the loads of SM s and of the chip."""
     before = 1.0 / max(1.0, load[s])
-    load[s] = max(0.0, load[s] + sign * sm[i] / alone[i])
+    pace = sign / alone[i]
+    load[s] = max(0.0, load[s] + pace * sm[i])
     after = 1.0 / max(1.0, load[s])
     for k in range(SERVERS):
-        loaded = max(0.0, server[s, k] + sign * chip[i, k] / alone[i])
+        loaded = max(0.0, server[s, k] + pace * chip[i, k])
         chip_load[k] += loaded * after - server[s, k] * before
         server[s, k] = loaded
+
+
+@njit(cache=True, nogil=True)
+def _next_end(ends: Any, s: int, places: int) -> int:
+    """Place of SM s whose unit ends first."""
+    best = 0
+    for p in range(1, places):
+        if ends[s, p] < ends[s, best]:
+            best = p
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _free_place(ends: Any, s: int, places: int) -> int:
+    """Lowest free place of SM s."""
+    for p in range(places):
+        if ends[s, p] == np.inf:
+            return p
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def _tournament(leaves: int) -> Any:
+    """Tree over equal leaves: ``first[1]`` is the winner, the lowest leaf wins a tie."""
+    first = np.zeros(2 * leaves, np.int64)
+    for leaf in range(leaves):
+        first[leaves + leaf] = leaf
+    for node in range(leaves - 1, 0, -1):
+        first[node] = first[2 * node]
+    return first
+
+
+@njit(cache=True, nogil=True)
+def _replay(first: Any, wake: Any, leaves: int, s: int) -> None:
+    """Settle again the games of leaf s, after ``wake[s]`` changed."""
+    node = (leaves + s) >> 1
+    while node > 0:
+        left = first[2 * node]
+        right = first[2 * node + 1]
+        first[node] = right if wake[right] < wake[left] else left
+        node >>= 1
