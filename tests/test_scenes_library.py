@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from models.errors import TilestampError
 from simulator.scenes import Scene, list_scenes, load_scene
@@ -181,6 +182,28 @@ def test_an_obj_file_is_a_cage_where_most_faces_are_quads(faces, kind, patches, 
 def test_a_file_named_like_an_embedded_scene_is_the_file(tmp_path):
     (tmp_path / "spot.obj").write_text(SQUARE + "f 1 2 3 4\n")
     assert len(load_scene(tmp_path / "spot.obj").patches.points) == 1
+
+
+def test_textures_of_an_obj_file_come_along(tmp_path):
+    Image.new("RGB", (2, 1), (255, 0, 0)).save(tmp_path / "red.png")
+    (tmp_path / "a.mtl").write_text("newmtl skin\nmap_Kd red.png\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl skin\n" + SQUARE + "vt 0 0\nf 1/1 2/1 3/1\n")
+    mesh = load_scene(tmp_path / "a.obj").mesh
+    assert mesh.textures[0].tolist() == [[[255, 0, 0, 255]] * 2]
+    assert mesh.texture_ids.tolist() == [0]
+
+
+def test_textures_of_a_gltf_file_come_along(shared):
+    assert len(load_scene(shared / "scenes" / "triangles" / "Duck.glb").mesh.textures) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("a.glb", b"glTF\x02\0\0\0"), ("a.gltf", b"{"), ("a.gltf", b'{"asset": {}}'), ("a.glb", b"")]
+)
+def test_a_broken_gltf_file_is_named(name, content, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(TilestampError, match=name):
+        load_scene(tmp_path / name)
 
 
 def test_a_triangle_file_gives_no_patches(tmp_path):

@@ -1,5 +1,8 @@
 """Meshes: OBJ files line by line, files that trimesh reads, clip-space arrays; and every kind of broken input."""
 
+import base64
+import json
+
 import numpy as np
 import pytest
 import trimesh
@@ -134,6 +137,31 @@ def test_parts_of_a_gltf_scene_are_placed_by_their_nodes_and_have_their_base_col
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
     assert mesh.positions[:, 0].tolist() == [0, 1, 0, 0, 10, 11, 10, 10]
     assert mesh.colors[[0, 7]].tolist() == [[1, 0, 0, 1], [0, 0, 1, 1]]
+
+
+def two_scenes(default):
+    """Write a glTF of two scenes, a node each, that draw the same triangle at x = 0 and x = 10."""
+    corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]).tobytes()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(corners).decode()
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}, {"nodes": [1]}],
+        "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [10, 0, 0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": uri}],
+    }
+    return json.dumps(document if default is None else {**document, "scene": default})
+
+
+@pytest.mark.parametrize(("default", "x"), [(None, 0), (0, 0), (1, 10)])
+def test_of_several_scenes_the_default_one_is_drawn(default, x, write):
+    mesh = load_scene(write("a.gltf", two_scenes(default))).mesh
+    assert mesh.positions[mesh.triangles[0], 0].tolist() == [x, x + 1, x]
+    assert len(mesh.triangles) == 1
 
 
 def test_normals_of_the_file_are_kept_and_turned_with_their_node(write):

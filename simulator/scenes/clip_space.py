@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +18,7 @@ def read_clip_space(path: str | Path) -> Mesh:
             members = {name: arrays[name] for name in arrays}
     except FileNotFoundError:
         raise TilestampError(f"{path}: there is no such file") from None
-    except (OSError, ValueError, TypeError, EOFError, BadZipFile):
+    except Exception:  # noqa: BLE001 (whatever zip and array readers raise, the file is to blame)
         raise TilestampError(f"{path}: is not a .npz file of plain arrays") from None
     for name in ("positions", "triangles"):
         if name not in members:
@@ -47,6 +46,13 @@ def clip_space_mesh(positions: ArrayLike, triangles: ArrayLike, source: str | Pa
 def clip_space_scene(mesh: Mesh, name: str) -> Scene:
     """Give a clip-space mesh as a scene; its only view leaves it where it is."""
     return Scene(name, mesh=mesh, views={"default": ModelToClip(np.eye(4))})
+
+
+def checked_mesh(mesh: Mesh, source: str | Path) -> Mesh:
+    """Give a mesh back, once its positions are known to be finite and its triangles to exist."""
+    finite_positions(mesh.positions, source)
+    vertex_numbers(mesh.triangles, len(mesh.positions), source)
+    return mesh
 
 
 def vertex_numbers(triangles: ArrayLike, vertices: int, source: str | Path) -> NDArray[np.int32]:

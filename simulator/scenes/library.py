@@ -14,12 +14,14 @@ from models.errors import TilestampError
 from simulator.scenes.approximate_catmull_clark import patches_from_cage
 from simulator.scenes.bpt import read_bpt
 from simulator.scenes.camera import Camera, fit_camera
-from simulator.scenes.clip_space import clip_space_scene, read_clip_space
+from simulator.scenes.clip_space import checked_mesh, clip_space_scene, read_clip_space
 from simulator.scenes.obj_file import read_obj
 from simulator.scenes.quad_cage import cage_of
 from simulator.scenes.scene import Scene
 from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from simulator.scenes.subpatches import split_to_count, tessellate
+from simulator.scenes.textured_mesh import read_gltf
+from simulator.scenes.textured_obj import read_textured_obj
 from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
 
 Kind = Literal["patches", "mesh"] | None
@@ -34,6 +36,7 @@ NOT_SHIPPED = {
     "bigguy": (3570, "Bay Raitt's big guy, 3570 patches"),
     "killeroo": (11532, "headus's killeroo, 11532 patches"),
 }
+GLTF_SUFFIXES = (".glb", ".gltf")  # read with their textures, which trimesh would leave to its materials
 Z_UP = ("teapot", "teacup", "teaspoon")  # Newell's models; all others are taken to have y up
 MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
 FINEST_TESSELLATION = 16  # quads along a patch
@@ -125,7 +128,9 @@ def bounds(scene: Scene) -> NDArray[np.float64]:
     """Box around all vertices and control points, (2, 3) float64."""
     homogeneous = [scene.patches.points.reshape(-1, 4)] if scene.patches is not None else []
     if scene.mesh is not None:
-        homogeneous.append(scene.mesh.positions[np.unique(scene.mesh.triangles)])
+        used = np.zeros(len(scene.mesh.positions), dtype=np.bool_)
+        used[scene.mesh.triangles] = True
+        homogeneous.append(scene.mesh.positions[used])
     points = np.concatenate(homogeneous).astype(np.float64)
     points = points[:, :3] / points[:, 3:]
     return np.stack([points.min(axis=0), points.max(axis=0)])
@@ -163,6 +168,8 @@ def _read(name: str, path: Path, kind: Kind) -> Scene:
         raise TilestampError(f"{path}: only .bpt and .obj files can give patches")
     elif suffix == ".npz":
         scene = clip_space_scene(read_clip_space(path), name)
+    elif suffix in GLTF_SUFFIXES:
+        scene = Scene(name, mesh=checked_mesh(read_gltf(path), path))
     else:
         scene = Scene(name, mesh=read_mesh(path))
     return replace(with_mesh(scene), patches=None) if kind == "mesh" else scene
@@ -173,7 +180,7 @@ def _from_obj(name: str, path: Path, kind: Kind) -> Scene:
     model = read_obj(path)
     if kind == "patches" or path.parent == DATA:
         return Scene(name, patches=patches_from_cage(cage_of(model, path)))
-    mesh = mesh_from_obj(model, path)
+    mesh = checked_mesh(read_textured_obj(path), path) if model.textured else mesh_from_obj(model, path)
     mostly_quads = 2 * int((model.sizes == 4).sum()) > len(model.sizes)
     if kind == "mesh" or not mostly_quads:
         return Scene(name, mesh=mesh)

@@ -32,6 +32,8 @@ class ObjFile:
         Row of ``base_colors`` for each polygon.
     base_colors : ndarray, (M, 4), float64
         Diffuse colour and opacity of each material; row 0 is white, for polygons with none.
+    textured : bool
+        Whether a material that is used has a texture (``map_Kd``): see `textured_obj`.
     """
 
     positions: NDArray[np.float64]
@@ -40,6 +42,7 @@ class ObjFile:
     sizes: NDArray[np.int64]
     materials: NDArray[np.int64]
     base_colors: NDArray[np.float64]
+    textured: bool = False
 
 
 @dataclass
@@ -53,6 +56,7 @@ class _Reading:
     names: dict[str, int] = field(default_factory=lambda: {"": 0})
     libraries: list[str] = field(default_factory=list)
     current: int = 0
+    textured: bool = False
 
 
 def read_obj(path: str | Path) -> ObjFile:
@@ -73,6 +77,7 @@ def read_obj(path: str | Path) -> ObjFile:
         raise TilestampError(
             f"{path}: a face uses vertex {corners.max() + 1}, but the file has {len(reading.vertices)} vertices"
         )
+    base_colors = _base_colors(Path(path), reading)
     colored = all(len(vertex) >= 6 for vertex in reading.vertices)
     return ObjFile(
         positions=np.array([vertex[:3] for vertex in reading.vertices]),
@@ -80,7 +85,8 @@ def read_obj(path: str | Path) -> ObjFile:
         corners=corners,
         sizes=np.array(reading.sizes, dtype=np.int64),
         materials=np.array(reading.materials, dtype=np.int64),
-        base_colors=_base_colors(Path(path), reading),
+        base_colors=base_colors,
+        textured=reading.textured,
     )
 
 
@@ -142,6 +148,8 @@ def _base_colors(path: Path, reading: _Reading) -> NDArray[np.float64]:
             words = line.split()
             if words[:1] == ["newmtl"]:
                 current = reading.names.get(" ".join(words[1:]), -1)
+            elif current >= 0 and words[:1] == ["map_Kd"]:
+                reading.textured = True
             elif current >= 0 and words[:1] in (["Kd"], ["d"]):
                 values = _material_numbers(words, f"{file}:{number}")
                 colors[current, slice(0, 3) if words[0] == "Kd" else slice(3, 4)] = values
