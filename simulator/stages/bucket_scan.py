@@ -1,0 +1,148 @@
+"""Parallel bucketing, the scan between its halves: START is the prefix sum of COUNT (Eisenacher & Loop 2010, section 3.2).
+
+The paper uses the parallel scan of CUDPP (Harris et al. 2008): each block sums 1024 counters, four a thread, by a tree in
+shared memory that is padded against bank conflicts; the sums of the blocks are scanned in the same way, level by level,
+and added back. Its launches and traffic are counted from that shape; the sum itself is NumPy's.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.coalescing import contiguous
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.work import Work
+
+BLOCK = 256  # threads
+ELEMENTS = 1024  # counters a block: a vector of four a thread
+WORD_BYTES = 4
+TREE_LEVELS = 8  # log2 of the vectors a block
+SHARED_BYTES = (BLOCK + BLOCK // 16) * WORD_BYTES  # a sum a vector, padded by a word every 16
+_LARGEST = 2**32 - 1  # START is 32 bits wide
+
+
+class BucketScanEvent(IntEnum):
+    """Events of one block, of the block scan and of the kernel that adds the sums back."""
+
+    WARPS = 0  # warps of the block: load four counters a lane, store them
+    LANES = 1  # lanes with a counter
+    STEP_WARPS = 2  # warps that take part in a step of the tree, up or down
+    STEP_LANES = 3
+    BARRIER = 4  # warps that arrive at a barrier
+    LOAD_TRANSACTIONS = 5
+    LOAD_BYTES = 6
+    STORE_TRANSACTIONS = 7
+    STORE_BYTES = 8
+
+
+_E = BucketScanEvent
+
+
+def bucket_scan(count: NDArray[np.uint32], simt: Simt, *, counting: bool = True) -> tuple[NDArray[np.uint32], list[Work]]:
+    """Prefix sum of COUNT.
+
+    Parameters
+    ----------
+    count : ndarray, (tiles,), uint32
+    simt : Simt
+    counting : bool
+        Without it no works come back.
+
+    Returns
+    -------
+    start : ndarray, (tiles,), uint32
+        START: patches in all tiles before.
+    works : list of Work
+        One for each launch: block scans level by level, then the sums added back from the top.
+
+    Raises
+    ------
+    TilestampError
+        More patches in tiles than 32 bits count.
+    """
+    ends = np.cumsum(count, dtype=np.int64)
+    if len(ends) and ends[-1] > _LARGEST:
+        raise TilestampError(f"{ends[-1]} patches in tiles are more than 32-bit lists hold: draw a smaller image")
+    start = (ends - count).astype(np.uint32)
+    if not counting:
+        return start, []
+    sizes = [len(count)]
+    while sizes[-1] > ELEMENTS:
+        sizes.append(-(-sizes[-1] // ELEMENTS))
+    up = [_scan_work(level, size, simt) for level, size in enumerate(sizes)]
+    down = [_add_work(level, sizes[level], simt) for level in range(len(sizes) - 2, -1, -1)]
+    return start, up + down
+
+
+def tree_steps(simt: Simt) -> tuple[int, int]:
+    """Warps and lanes that take part in one sweep over the tree: half as many lanes a step."""
+    lanes = [BLOCK >> level for level in range(1, TREE_LEVELS + 1)]
+    return sum(-(-n // simt.warp) for n in lanes), sum(lanes)
+
+
+def _buffers(level: int) -> tuple[str, str]:
+    """Names of what a level reads and writes."""
+    return ("COUNT", "START") if level == 0 else (f"SUMS{level}", f"SUMS{level}")
+
+
+def _work(kernel: str, size: int, table: NDArray[np.int64], shared_bytes: int, streams: tuple[Stream, ...]) -> Work:
+    blocks = -(-size // ELEMENTS)
+    return Work("bucket_scan", kernel, _E, table, blocks, BLOCK, shared_bytes, streams=streams)
+
+
+def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:
+    """Rows of all blocks with what both kernels do: each lane loads and stores a vector of four words."""
+    table = np.zeros((-(-size // ELEMENTS), len(_E)), np.int64)
+    for block, row in enumerate(table):
+        elements = min(ELEMENTS, size - block * ELEMENTS)
+        traffic = contiguous(0, elements * WORD_BYTES, simt.coalescing)
+        row[_E.WARPS] = -(-BLOCK // simt.warp)
+        row[_E.LANES] = -(-elements * BLOCK // ELEMENTS)
+        row[_E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = traffic
+        row[_E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = traffic
+    return table
+
+
+def _add_word(table: NDArray[np.int64], transactions: _E, simt: Simt) -> None:
+    """One word more a block: its sum, stored by one lane or loaded by all."""
+    table[:, transactions : transactions + 2] += contiguous(0, WORD_BYTES, simt.coalescing)
+
+
+def _scan_work(level: int, size: int, simt: Simt) -> Work:
+    """Block scans of one level; each block leaves its sum to the next level."""
+    table = _blocks(size, simt)
+    step_warps, step_lanes = tree_steps(simt)
+    table[:, _E.STEP_WARPS] = 2 * step_warps
+    table[:, _E.STEP_LANES] = 2 * step_lanes
+    table[:, _E.BARRIER] = (2 * TREE_LEVELS + 1) * table[:, _E.WARPS]
+    source, target = _buffers(level)
+    nbytes = size * WORD_BYTES
+    streams = [
+        Stream(source, "load", int(table[:, _E.LOAD_BYTES].sum()), nbytes),
+        Stream(target, "store", int(table[:, _E.STORE_BYTES].sum()), nbytes),
+    ]
+    if len(table) > 1:
+        before = int(table[:, _E.STORE_BYTES].sum())
+        _add_word(table, _E.STORE_TRANSACTIONS, simt)
+        written = int(table[:, _E.STORE_BYTES].sum()) - before
+        streams.append(Stream(f"SUMS{level + 1}", "store", written, len(table) * WORD_BYTES))
+    return _work("scan_blocks", size, table, SHARED_BYTES, tuple(streams))
+
+
+def _add_work(level: int, size: int, simt: Simt) -> Work:
+    """Adds the scanned sum of each block to its elements."""
+    table = _blocks(size, simt)
+    table[:, _E.BARRIER] = table[:, _E.WARPS]
+    target = _buffers(level)[1]
+    moved, nbytes = int(table[:, _E.LOAD_BYTES].sum()), size * WORD_BYTES
+    _add_word(table, _E.LOAD_TRANSACTIONS, simt)
+    sums = int(table[:, _E.LOAD_BYTES].sum()) - moved
+    streams = (
+        Stream(target, "load", moved, nbytes),
+        Stream(target, "store", moved, nbytes),
+        Stream(f"SUMS{level + 1}", "load", sums, len(table) * WORD_BYTES),
+    )
+    return _work("add_sums", size, table, WORD_BYTES, streams)

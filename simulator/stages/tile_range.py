@@ -1,0 +1,77 @@
+"""Screen tiles, and the tiles that a diced patch overlaps (Eisenacher & Loop 2010, section 3.1).
+
+At most two a side where the bound is no larger than a tile, three where it is no larger than two tiles, and so on.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from models.errors import TilestampError
+
+TILE_SIZES = (4, 8, 16, 32)  # pixels a side
+
+
+class Tiles(NamedTuple):
+    """The tiles of a screen, as kernels take them: integers only."""
+
+    size: int  # pixels a side
+    columns: int
+    rows: int
+    slots: int  # tiles a side that a patch may overlap
+
+    @property
+    def total(self) -> int:
+        """Tiles of the screen."""
+        return self.columns * self.rows
+
+
+def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
+    """Cut a screen into tiles.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels; tiles at the right and bottom edge may be partly outside.
+    tile : int
+        Pixels a side: 4, 8, 16 or 32.
+    bound : float
+        Pixels that the box of a patch stays below, in each direction.
+
+    Raises
+    ------
+    TilestampError
+        A tile size that has no kernel, or a bound that is no length.
+    """
+    if tile not in TILE_SIZES:
+        raise TilestampError(f"tile must be one of 4, 8, 16 or 32 pixels, not {tile}")
+    if not (math.isfinite(bound) and bound > 0):
+        raise TilestampError(f"bound must be a positive number of pixels, not {bound}")
+    return Tiles(tile, -(-width // tile), -(-height // tile), max(2, math.ceil(bound / tile) + 1))
+
+
+@njit(cache=True, nogil=True)
+def tile_range(box, tiles):
+    """First and last tile column and row that the box x0, y0, x1, y1 overlaps; last < first where it is off screen."""
+    scale = np.float32(1) / np.float32(tiles.size)
+    right, bottom = np.float32(tiles.columns), np.float32(tiles.rows)
+    x0 = np.int64(min(max(box[0] * scale, np.float32(0)), right))
+    y0 = np.int64(min(max(box[1] * scale, np.float32(0)), bottom))
+    x1 = np.int64(min(max(np.floor(box[2] * scale), np.float32(-1)), right))
+    y1 = np.int64(min(max(np.floor(box[3] * scale), np.float32(-1)), bottom))
+    x1 = min(x1, tiles.columns - 1, x0 + tiles.slots - 1)
+    y1 = min(y1, tiles.rows - 1, y0 + tiles.slots - 1)
+    return x0, y0, x1, y1
+
+
+@njit(cache=True, nogil=True)
+def slot_tiles(boxes, first, lanes, tiles, slots):
+    """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes)."""
+    for lane in range(lanes):
+        x0, y0, x1, y1 = tile_range(boxes[first + lane], tiles)
+        for j in range(tiles.slots):
+            for i in range(tiles.slots):
+                inside = x0 + i <= x1 and y0 + j <= y1
+                slots[j * tiles.slots + i, lane] = (y0 + j) * tiles.columns + x0 + i if inside else -1
