@@ -93,7 +93,7 @@ def timing(
     return Timing(
         stage=launch.stage,
         kernel=launch.kernel,
-        terms=terms,
+        term_cycles=terms,
         cycles=cycles,
         milliseconds=cycles / machine.clock_hz * 1e3,
         bound=bound,

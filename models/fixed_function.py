@@ -58,7 +58,7 @@ def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
     return Timing(
         stage=launch.stage,
         kernel=launch.kernel,
-        terms=terms,
+        term_cycles=terms,
         cycles=cycles,
         milliseconds=cycles / machine.clock_hz * 1e3,
         bound=max(terms, key=lambda name: terms[name]),

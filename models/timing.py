@@ -10,7 +10,7 @@ class Timing:
     Parameters
     ----------
     stage, kernel : str
-    terms : dict of str to float
+    term_cycles : dict of str to float
         Cycles that each limit alone would take (see ``models.bounds``); ``launch`` comes on top of the largest.
     cycles, milliseconds : float
         Of the whole launch; NaN where only counts were asked for.
@@ -26,7 +26,7 @@ class Timing:
 
     stage: str
     kernel: str
-    terms: dict[str, float]
+    term_cycles: dict[str, float]
     cycles: float
     milliseconds: float
     bound: str
@@ -34,3 +34,11 @@ class Timing:
     dram_bytes: float
     l2_bytes: float
     details: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """``term_cycles`` in milliseconds."""
+        return {
+            name: self.milliseconds * cycles / self.cycles if cycles else 0.0
+            for name, cycles in self.term_cycles.items()
+        }

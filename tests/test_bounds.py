@@ -33,7 +33,7 @@ def stream(buffer, op, size, footprint=None):
 
 def terms(machine=GTX280, **description):
     what = launch(**description)
-    return bounds(what, machine, traffic([what], machine)[0]).terms
+    return bounds(what, machine, traffic([what], machine)[0]).term_cycles
 
 
 def test_a_warp_instruction_issues_over_four_clocks_on_gt200():
@@ -114,14 +114,20 @@ def test_a_tiny_kernel_is_all_overhead():
 def test_sixteen_blocks_on_132_sms_are_bound_by_balance():
     got = bounds(launch(units=16, FP32=10**6), H200, NOTHING)
     assert got.bound == "balance"
-    assert got.terms["balance"] == pytest.approx(got.terms["issue"] * 132 / 16)
+    assert got.term_cycles["balance"] == pytest.approx(got.term_cycles["issue"] * 132 / 16)
 
 
 def test_time_is_launch_plus_the_largest_term():
     got = bounds(launch(FP32=500, SHARED=100), GTX280, NOTHING)
-    others = {name: value for name, value in got.terms.items() if name != "launch"}
-    assert got.cycles == got.terms["launch"] + max(others.values())
+    others = {name: value for name, value in got.term_cycles.items() if name != "launch"}
+    assert got.cycles == got.term_cycles["launch"] + max(others.values())
     assert got.bound == max(others, key=others.get)
+
+
+def test_terms_are_also_given_in_milliseconds():
+    got = bounds(launch(FP32=500), GTX280, NOTHING)
+    assert got.terms["issue"] + got.terms["launch"] == pytest.approx(got.milliseconds)
+    assert got.terms["shared"] == 0
 
 
 def test_an_issue_bound_launch_takes_half_the_time_at_twice_the_clock():
@@ -166,8 +172,8 @@ def test_reuse_misses_by_the_share_that_does_not_fit():
 def test_a_load_that_hits_l2_waits_less():
     writer = launch(streams=[stream("a", "store", 10**6)])
     reader = launch(streams=[stream("a", "load", 10**6)], CHAIN_LOAD=10)
-    warm = price([writer, reader], H200, "bounds")[1].terms["latency"]
-    cold = price([reader], H200, "bounds")[0].terms["latency"]
+    warm = price([writer, reader], H200, "bounds")[1].term_cycles["latency"]
+    cold = price([reader], H200, "bounds")[0].term_cycles["latency"]
     assert warm < cold
 
 

@@ -30,7 +30,7 @@ def launch(units, block=64, dispatch="blocks", grid=None, **events):
 
 
 def work_cycles(got):
-    return got.cycles - got.terms["launch"]
+    return got.cycles - got.term_cycles["launch"]
 
 
 @pytest.mark.parametrize("machine", [GTX280, H200], ids=lambda machine: machine.name)
