@@ -1,0 +1,78 @@
+"""What cudaraster reports besides the picture: the counters of the authors' profiler, and the memory of its queues."""
+
+from typing import Any
+
+from simulator.stages.bin_raster import SEGMENT_BYTES as BIN_SEGMENT_BYTES
+from simulator.stages.coarse_raster import SEGMENT_BYTES as TILE_SEGMENT_BYTES
+from simulator.stages.fine_raster_queue import FineRasterEvent
+from simulator.stages.triangle_setup import SUBTRIANGLE_BYTES, TriangleSetupEvent
+from simulator.work import Work
+
+Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name
+
+
+def setup_counters(setup: Work, fine: Work, drawn: int, triangles: int) -> Counters:
+    """Counters of triangle setup; ``drawn`` triangles of ``triangles`` have a sub-triangle."""
+    E = TriangleSetupEvent
+    return {
+        "TriangleSetup / Viewport cull": (100 * setup.total(E.VIEWPORT_CULLED), triangles),
+        "TriangleSetup / Backface cull": (100 * setup.total(E.BACKFACE_CULLED), triangles),
+        "TriangleSetup / Between pixels cull": (100 * setup.total(E.BETWEEN_CULLED), triangles),
+        "TriangleSetup / Clipped": (100 * setup.total(E.CLIP_LANES), triangles),
+        "TriangleSetup / Avg. samples / tri": (fine.total(FineRasterEvent.SAMPLE_HITS), drawn),
+    }
+
+
+def fine_counters(fine: Work, *, depth: bool, msaa: int) -> Counters:
+    """Counters of fine raster."""
+    E = FineRasterEvent
+    lanes, entries = 32 * fine.total(E.SEGMENTS), fine.total(E.ENTRY_LANES)
+    covered, fragments = fine.total(E.COVERAGE_LANES), fine.total(E.FRAGMENT_LANES)
+    tiles = len(fine.table)
+    return {
+        "FineRaster / Triangles culled / End of stream": (100 * (lanes - entries), lanes),
+        "FineRaster / Triangles culled / Early Z kill": (
+            100 * fine.total(E.EARLY_Z_KILLS),
+            fine.total(E.EARLY_Z_LANES),
+        ),
+        "FineRaster / Triangles culled / Empty coverage": (100 * fine.total(E.EMPTY_MASKS), covered),
+        "FineRaster / Z kills": (100 * fine.total(E.Z_KILLS), fragments if depth else 0),
+        "FineRaster / MSAA kills": (100 * fine.total(E.MSAA_KILLS), fragments if msaa > 1 else 0),
+        "FineRaster / Post-kill warp util.": (100 * fine.total(E.SHADE_LANES), 32 * fine.total(E.SHADE_ROUNDS)),
+        "FineRaster / Blend attempt rounds": (fine.total(E.BLEND_ROUND_LANES), fine.total(E.BLEND_LANES)),
+        "FineRaster / Avg. tri/tile": (entries, tiles),
+        "FineRaster / Avg. frag/tri": (fragments, covered),
+        "FineRaster / Avg. frag/tile": (fragments, tiles),
+    }
+
+
+def add_counters(sums: Counters, more: Counters) -> Counters:
+    """Sum numerators and denominators over the batches of a frame."""
+    return {name: (n + sums.get(name, (0, 0))[0], d + sums.get(name, (0, 0))[1]) for name, (n, d) in more.items()}
+
+
+def frame_facts(sums: Counters, queues: dict[str, int], release: str, retries: int) -> dict[str, Any]:
+    """Facts of a frame.
+
+    Parameters
+    ----------
+    sums : dict
+        Counters over all batches.
+    queues : dict
+        numSubtris, numBinSegs and numTileSegs, the largest of any batch.
+    release : str
+    retries : int
+        Draws that were repeated because a buffer was too small.
+    """
+    megabytes = {
+        "setup data": queues["numSubtris"] * SUBTRIANGLE_BYTES[release] / 2**20,
+        "bin queues": queues["numBinSegs"] * BIN_SEGMENT_BYTES / 2**20,
+        "tile queues": queues["numTileSegs"] * TILE_SEGMENT_BYTES / 2**20,
+    }
+    return {
+        **queues,
+        "memory_mb": megabytes,
+        "counters": {name: n / max(d, 1) for name, (n, d) in sums.items()},
+        "counter_sums": sums,
+        "retries": retries,
+    }

@@ -1,0 +1,57 @@
+"""From cudaraster's buffers to a frame: colours, the sample shown, heat maps by tile."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.stages.coarse_raster import TileQueues
+from simulator.stages.coverage import SAMPLE_COLUMN
+from simulator.stages.fine_raster import FrameBuffers
+from simulator.stages.fine_raster_queue import FineRasterEvent
+from simulator.stages.pixel_barycentrics import pixel_barycentrics
+from simulator.stages.triangle_setup import Release
+from simulator.work import Work
+
+
+def shown_sample(samples: int) -> int:
+    """Sample nearest to the pixel's centre."""
+    rows = np.arange(samples)
+    columns = SAMPLE_COLUMN[samples.bit_length() - 1, :samples]
+    return int(np.argmin((2 * columns + 1 - samples) ** 2 + (2 * rows + 1 - samples) ** 2))
+
+
+def frame_image(
+    buffers: FrameBuffers,
+    width: int,
+    height: int,
+    release: Release,
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    colors: NDArray[np.float32] | None,
+) -> NDArray[np.uint8]:
+    """Colours of all pixels, (H, W, 3) uint8, row 0 on top; samples are averaged."""
+    if release == "nvdiffrast" and colors is not None:  # it draws triangle numbers; colours are found afterwards
+        ids = np.ascontiguousarray(buffers.ids[0, :height, :width])
+        weights = pixel_barycentrics(ids, positions, triangles)[..., :2]
+        weights = np.concatenate([weights, 1 - weights.sum(axis=-1, keepdims=True)], axis=-1)
+        corners = colors[triangles[np.maximum(ids, 0)], :3]
+        shaded = np.einsum("hwk,hwkc->hwc", weights, corners) * (ids >= 0)[..., None]
+        return np.clip(shaded * 255 + 0.5, 0, 255).astype(np.uint8)[::-1]
+    packed = buffers.color[:, :height, :width]
+    channels = [((packed >> np.uint32(8 * c)) & np.uint32(255)).mean(axis=0) for c in range(3)]
+    return (np.stack(channels, axis=-1) + 0.5).astype(np.uint8)[::-1]
+
+
+def tile_maps(maps: dict[str, NDArray[np.int64]], tiles: TileQueues, fine: Work | None) -> None:
+    """Add one draw to the heat maps, a cell a tile, row 0 on top."""
+    shape = (tiles.tiles_y, tiles.tiles_x)
+    _add(maps, "tile_triangles", np.diff(tiles.starts).reshape(shape))
+    if fine is None:
+        return
+    for name, event in (("tile_fragments", FineRasterEvent.FRAGMENT_LANES), ("tile_z_kills", FineRasterEvent.Z_KILLS)):
+        cells = np.zeros(shape[0] * shape[1], np.int64)
+        cells[tiles.active] = fine.table[:, event]
+        _add(maps, name, cells.reshape(shape))
+
+
+def _add(maps: dict[str, NDArray[np.int64]], name: str, cells: NDArray[np.int64]) -> None:
+    maps[name] = cells[::-1] + maps.get(name, 0)

@@ -1,0 +1,180 @@
+"""CudaRaster: triangles to pixels in four kernels, in input order (Laine & Karras 2011, section 3).
+
+Triangle setup culls and prepares, bin raster queues triangles by 128x128 pixels, coarse raster by 8x8, and fine
+raster draws each 8x8 tile in shared memory.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.pipelines._cudaraster_facts import Counters, add_counters, fine_counters, frame_facts, setup_counters
+from simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
+from simulator.scenes.scene import Scene
+from simulator.stages import bin_raster as bins
+from simulator.stages import coarse_raster as tiles
+from simulator.stages.fine_raster import MODES, FrameBuffers, Mode, fine_raster
+from simulator.stages.triangle_setup import SLACK, Release, triangle_setup
+from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from simulator.work import Work
+
+MAX_BATCHES = 1024
+
+
+@dataclass
+class _State:
+    """What draws of one frame hand on: capacities, pixels and sums."""
+
+    options: dict[str, Any]
+    size: tuple[int, int]
+    simt: Simt
+    counting: bool
+    colors: NDArray[np.float32] | None
+    capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
+    needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
+    retries: int = 0
+    buffers: FrameBuffers | None = None
+    works: list[Work] = field(default_factory=list)
+    counters: Counters = field(default_factory=dict)
+    maps: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+
+def cudaraster(
+    scene: Scene,
+    matrix: NDArray[np.floating],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Release = "1.1",
+    msaa: int = 1,
+    mode: Mode = "depth",
+    cull_backfaces: bool | None = None,
+    batches: int = 1,
+    counting: bool = True,
+) -> Frame:
+    """Draw a mesh as CudaRaster does.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a mesh; one in clip space goes straight to triangle setup.
+    matrix : ndarray, (4, 4)
+        Model to clip space, row-major, column vectors; applied in float32.
+    width, height : int
+        Pixels, at most 2048.
+    simt : Simt
+        The machine's shape.
+    release : {"1.1", "nvdiffrast"}
+    msaa : int
+        1, 2, 4 or 8 samples a pixel (nvdiffrast: 1).
+    mode : {"depth", "blend", "depth-only", "color"}
+        Depth test and interpolation; no depth, interpolation, blending; depth without colour; neither depth nor
+        interpolation (the published sweep).
+    cull_backfaces : bool or None
+        None: as published, on in 1.1, off in nvdiffrast.
+    batches : int
+        Draws that the triangles are divided among; the first clears.
+    counting : bool
+
+    Returns
+    -------
+    Frame
+        Depth is the original's fixed point, uint32. With several samples, depth and triangle ids are those of the
+        sample nearest to the pixel's centre.
+
+    Raises
+    ------
+    TilestampError
+        Where the scene or an option cannot be drawn.
+    """
+    _check(release, mode, batches)
+    mesh = triangle_mesh(scene)
+    positions = clip_positions(mesh, matrix)
+    options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
+    colors = None if mode == "depth-only" else vertex_colors(mesh, matrix)
+    state = _State(options, (width, height), simt, counting, colors)
+    for first, last in _batch_bounds(len(mesh.triangles), batches):
+        _draw(state, positions, mesh.triangles[first:last], first)
+    assert state.buffers is not None  # noqa: S101 - there is at least one batch
+    sample = shown_sample(msaa)
+    ids = state.buffers.ids[sample, :height, :width][::-1]
+    image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
+    facts = frame_facts(state.counters, state.needed, release, state.retries)
+    return Frame(
+        image, state.buffers.depth[sample, :height, :width][::-1], state.works, ids, maps=state.maps, facts=facts
+    )
+
+
+def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.int32], first: int) -> None:
+    """One draw: the four stages, again from the start with larger buffers where one was too small."""
+    width, height = state.size
+    release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
+    depth, _, _, interpolate = MODES[mode]
+    shape = {"width": width, "height": height, "simt": state.simt, "release": release, "counting": state.counting}
+    _initial_capacity(state, len(triangles))
+    clear = state.buffers is None
+    while True:
+        setup, setup_work, facts = triangle_setup(
+            positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
+            depth=depth, interpolate=interpolate, capacity=state.capacity["numSubtris"],
+        )  # fmt: skip
+        if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
+            continue
+        queues, bin_work, bin_facts = bins.bin_raster(setup, **shape)
+        if _grow(state, "numBinSegs", bin_facts["num_bin_segments"], 256):
+            continue
+        lists, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=clear, **shape)
+        if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
+            break
+    setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
+    state.buffers, fine_work = fine_raster(
+        setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
+        colors=state.colors, buffers=state.buffers,
+    )  # fmt: skip
+    state.works += [setup_work, bin_work, tile_work, fine_work]
+    if state.counting:
+        drawn = int(np.count_nonzero(setup.subtriangles))
+        counters = setup_counters(setup_work, fine_work, drawn, len(triangles)) | bin_facts["counters"]
+        counters |= tile_facts["counters"] | fine_counters(fine_work, depth=depth, msaa=samples)
+        state.counters = add_counters(state.counters, counters)
+    tile_maps(state.maps, lists, fine_work if state.counting else None)
+
+
+def _initial_capacity(state: _State, triangles: int) -> None:
+    """Room for a draw, as the original makes it: from the number of triangles, and never less than before."""
+    first = {
+        "numSubtris": triangles + SLACK,
+        "numBinSegs": bins.initial_capacity(triangles, *state.size),
+        "numTileSegs": tiles.initial_capacity(triangles, *state.size),
+    }
+    state.capacity = {name: max(room, first[name]) for name, room in state.capacity.items()}
+
+
+def _grow(state: _State, name: str, needed: int, slack: int) -> bool:
+    """Note what a draw needed; True, with more room, where it did not fit."""
+    state.needed[name] = max(state.needed[name], needed)
+    if needed <= state.capacity[name]:
+        return False
+    state.capacity[name] = needed + slack
+    state.retries += 1
+    return True
+
+
+def _batch_bounds(triangles: int, batches: int) -> list[tuple[int, int]]:
+    """First and last triangle of each draw."""
+    return [(triangles * i // batches, triangles * (i + 1) // batches) for i in range(batches)]
+
+
+def _check(release: str, mode: str, batches: int) -> None:
+    if mode not in MODES:
+        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
+    if release == "nvdiffrast" and mode != "depth":
+        raise TilestampError(f"mode is {mode!r}; release nvdiffrast has only 'depth'")
+    if not 1 <= batches <= MAX_BATCHES:
+        raise TilestampError(f"{batches} batches: 1 to {MAX_BATCHES} can be drawn")

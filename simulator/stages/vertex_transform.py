@@ -1,0 +1,86 @@
+"""Vertices before the pipeline: model space to clip space in float32, and a colour where the mesh has none."""
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from simulator.scenes.scene import Mesh, Scene
+
+ALPHA = np.float32(0.5)  # of colours made here, as in the published benchmarks
+AMBIENT = np.float32(0.2)
+_CHUNK = 4096  # vertices
+
+
+@njit(cache=True, nogil=True)
+def _transform_range(first, last, positions, matrix, out):
+    for v in range(first, last):
+        for c in range(4):
+            value = matrix[c, 0] * positions[v, 0]
+            for k in range(1, 4):
+                value += matrix[c, k] * positions[v, k]
+            out[v, c] = value
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _transform(positions, matrix, out):
+    for c in prange((positions.shape[0] + _CHUNK - 1) // _CHUNK):
+        _transform_range(c * _CHUNK, min((c + 1) * _CHUNK, positions.shape[0]), positions, matrix, out)
+
+
+@njit(cache=True, nogil=True)
+def _add_normals(positions, triangles, normals):
+    """Add each triangle's normal, as long as its area, to its vertices."""
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if min(a, b, c) < 0 or max(a, b, c) >= positions.shape[0]:
+            continue
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            e, f = positions[b, i] - positions[a, i], positions[b, j] - positions[a, j]
+            g, h = positions[c, i] - positions[a, i], positions[c, j] - positions[a, j]
+            for v in (a, b, c):
+                normals[v, k] += e * h - f * g
+
+
+def triangle_mesh(scene: Scene) -> Mesh:
+    """Return the scene's mesh.
+
+    Raises
+    ------
+    TilestampError
+        Where the scene has no triangles.
+    """
+    if scene.mesh is None or len(scene.mesh.triangles) == 0:
+        raise TilestampError(f"the scene {scene.name} has no triangles, and this pipeline draws nothing else")
+    return scene.mesh
+
+
+def clip_positions(mesh: Mesh, matrix: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Clip positions of all vertices, (V, 4) float32; ``matrix`` is row-major for column vectors."""
+    if mesh.clip_space:
+        return np.ascontiguousarray(mesh.positions)
+    out = np.empty_like(mesh.positions)
+    _transform(np.ascontiguousarray(mesh.positions), np.ascontiguousarray(matrix, np.float32), out)
+    return out
+
+
+def vertex_colors(mesh: Mesh, matrix: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Colours of all vertices, (V, 4) float32: the mesh's own, or lit from the eye by the normals."""
+    if mesh.colors is not None:
+        return np.ascontiguousarray(mesh.colors, np.float32)
+    normals = mesh.normals
+    if normals is None:
+        normals = np.zeros((len(mesh.positions), 3), np.float32)
+        _add_normals(np.ascontiguousarray(mesh.positions), mesh.triangles, normals)
+    toward = np.array([0, 0, 1], np.float32) if mesh.clip_space else view_direction(matrix)
+    with np.errstate(all="ignore"):
+        facing = np.abs(normals @ toward) / np.sqrt((normals * normals).sum(axis=1))
+    light = AMBIENT + (1 - AMBIENT) * np.nan_to_num(facing, nan=0.0, posinf=0.0)
+    return np.stack([light, light, light, np.full_like(light, ALPHA)], axis=1).astype(np.float32)
+
+
+def view_direction(matrix: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Unit vector along which the camera looks, in model space."""
+    row = matrix[3, :3] if np.any(matrix[3, :3]) else matrix[2, :3]
+    return np.asarray(row / max(float(np.linalg.norm(row)), 1e-30), np.float32)
