@@ -36,3 +36,8 @@ def _scene_search_path() -> Iterator[None]:
     os.environ[SCENES_VARIABLE] = os.pathsep.join(map(str, folders))
     yield
     del os.environ[SCENES_VARIABLE]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the tests that are small enough to run interpreted and with bounds checked."""
+    config.addinivalue_line("markers", "small: quick enough with NUMBA_DISABLE_JIT=1 and with NUMBA_BOUNDSCHECK=1")

@@ -134,8 +134,7 @@ def _triangles(vertices: Floats) -> NDArray[np.int32]:
     corner = np.arange(PATCH_QUADS)[:, None] * side + np.arange(PATCH_QUADS)
     v0, v1, v2, v3 = (corner + offset for offset in (0, 1, side, side + 1))
     pattern = np.stack([v0, v1, v2, v2, v1, v3], axis=-1).reshape(-1, 3)
-    reach: Floats = np.abs(vertices[:, :, :2]).max(axis=2)
-    inside = reach <= f32(1.0)
+    inside = np.maximum(np.abs(vertices[:, :, 0]), np.abs(vertices[:, :, 1])) <= f32(1.0)
     kept = inside[:, pattern[:, 0]] & inside[:, pattern[:, 1]] & inside[:, pattern[:, 2]]
     patch, triangle = np.nonzero(kept)
     numbers = pattern.astype(np.int32)[triangle]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 WORDS = 11  # words of state, then one more: the place of the next draw
 SHORT_LAG_PLACE = 7
 AUTHORS_SEED = 123
+MASK = np.uint64(0xFFFFFFFF)
 
 
 @njit(cache=True, nogil=True)
@@ -18,8 +19,8 @@ def _draw(state: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> None:
     place = state[WORDS]
     for i in range(numbers.size):
         partner = (place + np.uint32(SHORT_LAG_PLACE)) % np.uint32(WORDS)
-        value = np.uint32(state[place] + state[partner])
-        value = np.uint32((value << np.uint32(13)) | (value >> np.uint32(19)))
+        total = (np.uint64(state[place]) + np.uint64(state[partner])) & MASK
+        value = ((total << np.uint64(13)) & MASK) | (total >> np.uint64(19))
         state[place] = value
         place = np.uint32((place + np.uint32(WORDS - 1)) % np.uint32(WORDS))
         numbers[i] = value
@@ -34,12 +35,12 @@ def random_state(seed: int = AUTHORS_SEED) -> NDArray[np.uint32]:
     seed : int
         Not 0 modulo 2**32: xorshift stays at 0.
     """
-    word = seed & 0xFFFFFFFF
+    word = seed & int(MASK)
     state = np.zeros(WORDS + 1, dtype=np.uint32)
     for i in range(WORDS):
-        word ^= (word << 13) & 0xFFFFFFFF
+        word ^= (word << 13) & int(MASK)
         word ^= word >> 17
-        word ^= (word << 5) & 0xFFFFFFFF
+        word ^= (word << 5) & int(MASK)
         state[i] = word
     draw_words(state, WORDS)
     return state
