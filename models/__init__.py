@@ -1,7 +1,7 @@
 """The SIMT machine: counting rules, occupancy, memory, atomics, time. It knows no triangle, tile or patch.
 
-``price(launches, load_machine("gtx280"), "schedule")`` prices the launches of a frame. What is named here is loaded
-when it is first used.
+``models.price.price(launches, load_machine("gtx280"), "schedule")`` prices the launches of a frame. What is named
+here is loaded when it is first used.
 """
 
 from importlib import import_module
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from models.launch import Launch, Stream
     from models.machine import Machine, altered, list_machines, load_machine
     from models.occupancy import Residency, residency
-    from models.pricing import price
     from models.simt import Simt
     from models.timing import Timing
 
@@ -35,7 +34,6 @@ _HOMES = {
     "altered": "machine",
     "list_machines": "machine",
     "load_machine": "machine",
-    "price": "pricing",
     "residency": "occupancy",
 }
 
@@ -52,7 +50,6 @@ __all__ = [
     "altered",
     "list_machines",
     "load_machine",
-    "price",
     "residency",
 ]
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from models import price
 from models.bounds import bounds
 from models.errors import TilestampError
 from models.events import EVENTS, MachineEvent
 from models.fixed_function import PipeLaunch
 from models.launch import Launch, Stream
 from models.machine import altered, load_machine
+from models.price import price
 from models.traffic import Traffic, traffic
 
 GTX280 = load_machine("gtx280")
