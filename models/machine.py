@@ -161,6 +161,11 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.identity.name
 
     @property
+    def compute_capability(self) -> str:
+        """Such as ``"1.3"``."""
+        return self.identity.compute_capability
+
+    @property
     def simt(self) -> Simt:
         """The part that counting depends on."""
         return Simt(
