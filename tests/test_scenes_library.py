@@ -106,6 +106,21 @@ def test_a_stand_in_serves_only_where_the_file_is_missing(tmp_path, alone):
     assert scene_or_stand_in("bigguy", tmp_path).note == ""
 
 
+@pytest.mark.parametrize("name", ["bigguy", "killeroo"])
+def test_a_stand_in_has_the_models_views_and_fits_them(name, shared):
+    real, other = load_scene(name), stand_in(name)
+    assert list(other.views) == list(real.views)
+    clip = other.patches.points.reshape(-1, 4).astype(np.float64) @ other.views["default"].matrix(1600, 1200).T
+    shown = np.abs(clip[:, :3] / clip[:, 3:]).max()
+    assert 0.5 < shown < 1
+
+
+@pytest.mark.parametrize("name", ["bigguy", "killeroo"])
+def test_a_stand_in_is_nine_tenths_as_large_as_the_model(name, shared):
+    sizes = [np.linalg.norm(np.ptp(bounds(scene), axis=0)) for scene in (load_scene(name), stand_in(name))]
+    assert sizes[1] == pytest.approx(0.9 * sizes[0], rel=1e-2)
+
+
 def test_there_is_no_stand_in_for_other_models():
     with pytest.raises(TilestampError, match="no stand-in for 'bunny'"):
         stand_in("bunny")

@@ -1,11 +1,8 @@
 """Scenes by name: the embedded ones, those on the search path, files, and stand-ins for models that cannot ship."""
 
-import importlib
-import importlib.util
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +14,13 @@ from simulator.scenes.camera import Camera, fit_camera
 from simulator.scenes.clip_space import checked_mesh, clip_space_scene, read_clip_space
 from simulator.scenes.obj_file import read_obj
 from simulator.scenes.quad_cage import cage_of
-from simulator.scenes.scene import Scene
+from simulator.scenes.scene import Patches, Scene
 from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from simulator.scenes.subpatches import split_to_count, tessellate
 from simulator.scenes.textured_mesh import read_gltf
 from simulator.scenes.textured_obj import read_textured_obj
 from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
+from simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
 
@@ -31,13 +29,23 @@ EMBEDDED = {
     "teapot": ("teapot.bpt", "Newell's teapot, 32 patches (embedded)"),
     "spot": ("spot_control_mesh.obj", "Keenan Crane's cow, a Catmull-Clark cage of 732 patches (embedded)"),
 }
-# Models of the papers that are not shipped: patches, and what they are.
+
+
+class Absent(NamedTuple):
+    """A model of the papers that is not shipped; its middle is the origin."""
+
+    patches: int
+    line: str
+    diagonal: float  # of its box, in model units
+
+
 NOT_SHIPPED = {
-    "bigguy": (3570, "Bay Raitt's big guy, 3570 patches"),
-    "killeroo": (11532, "headus's killeroo, 11532 patches"),
+    "bigguy": Absent(3570, "Bay Raitt's big guy, 3570 patches", 9.117),
+    "killeroo": Absent(11532, "headus's killeroo, 11532 patches", 6.688),
 }
 GLTF_SUFFIXES = (".glb", ".gltf")  # read with their textures, which trimesh would leave to its materials
-Z_UP = ("teapot", "teacup", "teaspoon")  # Newell's models; all others are taken to have y up
+Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
+STAND_IN_SIZE = 0.9  # diagonal of its box over the model's: the cow is stouter, and must lie inside the same views
 MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
 FINEST_TESSELLATION = 16  # quads along a patch
 
@@ -76,26 +84,34 @@ def list_scenes(scene_path: SearchPath = None) -> list[tuple[str, str]]:
     """List the scenes that can be loaded by name, each with one line of what it is."""
     lines = {name: line for name, (_, line) in EMBEDDED.items()}
     for path in scene_files(scene_path):
-        known = NOT_SHIPPED.get(path.stem, (0, ""))[1] if path.suffix == ".bpt" else ""
-        lines.setdefault(path.stem, f"{known or path.suffix[1:] + ' file'} ({path})")
-    for name, (_, line) in NOT_SHIPPED.items():
-        lines.setdefault(name, f"{line}: not here; put {name}.bpt on the scene search path (TILESTAMP_SCENES)")
+        known = path.stem in NOT_SHIPPED and path.suffix == ".bpt"
+        lines.setdefault(path.stem, f"{NOT_SHIPPED[path.stem].line if known else path.suffix[1:] + ' file'} ({path})")
+    for name, model in NOT_SHIPPED.items():
+        lines.setdefault(name, f"{model.line}: not here; put {name}.bpt on the scene search path (TILESTAMP_SCENES)")
     return list(lines.items())
 
 
 def stand_in(name: str) -> Scene:
-    """Give as many patches as a model that is not here has, cut from the embedded cage; its note says so."""
+    """Give as many patches as a model that is not here has, cut from the embedded cage; its note says so.
+
+    They are turned and scaled into the model's place, so that the model's views show them about as large.
+    """
     if name not in NOT_SHIPPED:
         raise TilestampError(f"there is no stand-in for {name!r}, only for {' and '.join(NOT_SHIPPED)}")
-    count, line = NOT_SHIPPED[name]
+    model = NOT_SHIPPED[name]
     cow = load_scene("spot")
     if cow.patches is None:
         raise TilestampError("the embedded cage is damaged: reinstall")
+    low, high = bounds(cow)
+    scale = STAND_IN_SIZE * model.diagonal / float(np.linalg.norm(high - low))
+    turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if name in Z_UP else np.eye(3)
+    points = split_to_count(cow.patches, model.patches).points.astype(np.float64)
+    points[..., :3] = (points[..., :3] - points[..., 3:] * (low + high) / 2.0) @ (scale * turn).T
     note = (
-        f"stand-in: {count} patches cut from the embedded spot, because {name} ({line}) is not here;"
+        f"stand-in: {model.patches} patches cut from the embedded spot, because {name} ({model.line}) is not here;"
         f" put {name}.bpt on the scene search path (TILESTAMP_SCENES)"
     )
-    return replace(cow, name=name, patches=split_to_count(cow.patches, count), note=note)
+    return with_views(Scene(name, patches=Patches(points.astype(np.float32)), note=note))
 
 
 def scene_or_stand_in(name: str, scene_path: SearchPath = None) -> Scene:
@@ -117,7 +133,7 @@ def with_mesh(scene: Scene) -> Scene:
 
 def with_views(scene: Scene, up: ArrayLike | None = None) -> Scene:
     """Give a scene the views known for its name, and a fitted ``default`` where they have none."""
-    views: dict[str, Camera] = {**_known_views(scene.name), **scene.views}
+    views: dict[str, Camera] = {**VIEWS.get(scene.name, {}), **scene.views}
     if "default" not in views:
         axis = up if up is not None else (0.0, 0.0, 1.0) if scene.name in Z_UP else (0.0, 1.0, 0.0)
         views["default"] = fit_camera(bounds(scene), axis)
@@ -134,13 +150,6 @@ def bounds(scene: Scene) -> NDArray[np.float64]:
     points = np.concatenate(homogeneous).astype(np.float64)
     points = points[:, :3] / points[:, 3:]
     return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def _known_views(name: str) -> Mapping[str, Camera]:
-    if importlib.util.find_spec("simulator.scenes.views") is None:
-        return {}
-    views: Mapping[str, Mapping[str, Camera]] = importlib.import_module("simulator.scenes.views").VIEWS
-    return views.get(name, {})
 
 
 def _resolve(source: str | Path, scene_path: SearchPath) -> Path:
