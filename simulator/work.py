@@ -1,4 +1,4 @@
-"""A work table: what a stage did, one row a unit of work, one int64 column for each of its own events."""
+"""What a stage did: a work table, one row a unit of work, a column for each of its own events; or items of a fixed pipe."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from models.fixed_function import PipeLaunch
 from models.launch import Stream
 
 
@@ -54,3 +55,33 @@ class Work:
     def counts(self) -> dict[str, int]:
         """Every event by name, summed over all units."""
         return {event.name: self.total(event) for event in self.events}
+
+
+@dataclass(frozen=True)
+class FixedFunctionWork:
+    """What passed through the units of a fixed-function pipe.
+
+    Parameters
+    ----------
+    stage, kernel : str
+    items : dict of str to int
+        By the name of the unit in a machine file: ``primitives``, ``pixels``...
+    events : dict of str to int
+        Further counts that no unit prices (SAMPLE_HITS...).
+    streams : tuple of Stream
+        Buffers touched.
+    """
+
+    stage: str
+    kernel: str
+    items: dict[str, int]
+    events: dict[str, int] = field(default_factory=dict)
+    streams: tuple[Stream, ...] = ()
+
+    def counts(self) -> dict[str, int]:
+        """Items by unit, in capitals, and the further counts."""
+        return {name.upper(): count for name, count in self.items.items()} | self.events
+
+    def launch(self) -> PipeLaunch:
+        """The pass, as the machine prices it."""
+        return PipeLaunch(self.stage, self.kernel, dict(self.items), self.streams)

@@ -128,12 +128,12 @@ def _simulate(
     options: dict[str, Any],
 ) -> Run:
     """Load the machine with its what-ifs and simulate."""
-    from models.machine import load_machine, override
+    from models.machine import altered, load_machine
     from simulator.simulate import simulate
 
     described = load_machine(machine)
-    for change in changes:
-        described = override(described, *parse_assignment(change))
+    if changes:
+        described = altered(described, dict(map(parse_assignment, changes)), "assumed", "a what-if on the command line")
     return simulate(
         scene, pipeline, described, width=size[0], height=size[1], camera=camera, fidelity=fidelity, **options
     )
