@@ -20,6 +20,7 @@ from pathlib import Path
 
 PACKAGES = ("models", "simulator")  # the packages that hold kernels
 STALE_DAYS = 14  # folders of other sources that nobody has opened for so long are removed
+_OURS = "TILESTAMP_COMPILE_CACHE"  # the folder that we chose: a child process with other flags chooses again
 _FLAGS = ("NUMBA_BOUNDSCHECK", "NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME")
 
 
@@ -40,6 +41,11 @@ def cache_folder() -> Path:
     return Path(named) if named else _user_cache() / "tilestamp" / _key()
 
 
+def _named_by_user() -> bool:
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    return bool(named) and named != os.environ.get(_OURS)
+
+
 def is_cold() -> bool:
     """Whether no kernel has been compiled into the cache folder yet: the first run will take its time."""
     return next(cache_folder().rglob("*.nbi"), None) is None
@@ -53,14 +59,14 @@ def set_up() -> Path:
     Path
         The folder, made where it did not exist; a folder for temporary files where the cache cannot be written.
     """
-    if os.environ.get("NUMBA_CACHE_DIR"):
+    if _named_by_user():
         return cache_folder()
-    folder = cache_folder()
+    folder = _user_cache() / "tilestamp" / _key()
     if not _make_writable(folder):
         folder = Path(tempfile.gettempdir()) / f"tilestamp-{_user_id()}" / _key()
         _make_writable(folder)
     _prune(folder)
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    os.environ["NUMBA_CACHE_DIR"] = os.environ[_OURS] = str(folder)
     if "numba" in sys.modules:  # it read its settings when it was imported
         sys.modules["numba"].config.CACHE_DIR = str(folder)
     return folder

@@ -10,7 +10,7 @@ from models import compile_cache
 
 
 def _folder_of_new_process(**environment):
-    clean = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "TILESTAMP_"))}
     code = "import models, numba; print(numba.config.CACHE_DIR)"
     root = Path(compile_cache.__file__).parent.parent
     done = subprocess.run(  # noqa: S603 - our own interpreter, our own code
@@ -27,6 +27,12 @@ def test_bounds_checking_has_a_folder_of_its_own(tmp_path):
     plain = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path))
     checked = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path), NUMBA_BOUNDSCHECK="1")
     assert plain != checked
+
+
+def test_a_child_process_with_other_flags_does_not_inherit_the_folder(tmp_path):
+    plain = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path))
+    inherited = {"NUMBA_CACHE_DIR": str(plain), "TILESTAMP_COMPILE_CACHE": str(plain), "NUMBA_BOUNDSCHECK": "1"}
+    assert _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path), **inherited) != plain
 
 
 def test_a_folder_named_by_the_user_is_left_alone(tmp_path):
