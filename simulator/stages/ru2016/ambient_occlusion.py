@@ -44,7 +44,7 @@ def noise() -> NDArray[np.float32]:
     return np.stack([np.cos(2.0 * np.pi * order), np.sin(2.0 * np.pi * order)], axis=2).astype(np.float32)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int, y: int, radius: Any) -> int:
     """Samples of one pixel that lie behind what is drawn there."""
     height, width = w.shape
@@ -75,7 +75,7 @@ def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int,
     return occluded
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, y: int, light: Any) -> None:
     for x in range(w.shape[1]):
         if w[y, x] > _ZERO:
@@ -84,7 +84,7 @@ def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: 
             light[y, x] = _ONE - np.float32(found) / np.float32(len(samples))
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def _ambient_occlusion(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, light: Any) -> None:
     for y in prange(len(w)):
         _row(w, normals, turns, samples, scales, relative, y, light)

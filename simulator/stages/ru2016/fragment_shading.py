@@ -49,7 +49,7 @@ class Fragments(NamedTuple):
     w: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: bool) -> tuple[Any, Any, Any, Any]:
     """Weights of a triangle's corners at a point of the screen, and the interpolated w."""
     x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
@@ -62,7 +62,7 @@ def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: 
     return a, b, c, w
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _interpolate_row(
     screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any, visible: Any, y: int,
     perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -88,7 +88,7 @@ def _interpolate_row(
         depths[y, x] = w
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def _interpolate(
     screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any, visible: Any,
     perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -120,7 +120,7 @@ def interpolate(mesh: Geometry, vertices: ShadedVertices, visible: Visible, *, p
     return fragments
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _shade_row(
     visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any, colors: Any, light: Any,
     y: int, out: Any,
@@ -143,7 +143,7 @@ def _shade_row(
             out[y, x, c] = np.uint8(min(max(value, _ZERO), _ONE) * np.float32(255.0) + _HALF)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def _shade(
     visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any, colors: Any, light: Any,
     out: Any,

@@ -73,7 +73,7 @@ class Race(NamedTuple):
     landed: NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _wave(
     screen: Any, triangles: Any, drawable: Any, first: int, end: int, culling: bool, warp: int, merge: int,
     nearest: Any, depth: Any, raced: Any, landed: Any, rounds: int, requests: Any, events: Any,
@@ -108,7 +108,7 @@ def _wave(
     return rounds + last
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _row(events: Any, w: int, warp: int) -> Any:
     """The events of a warp's block."""
     if events is None:
@@ -116,7 +116,7 @@ def _row(events: Any, w: int, warp: int) -> Any:
     return events[w * warp // BLOCK]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, first: int, shape: Any, culling: bool, boxes: Any, row: Any
 ) -> int:
@@ -148,7 +148,7 @@ def _boxes(
     return longest
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _step(
     screen: Any, triangles: Any, boxes: Any, s: int, nearest: Any, depth: Any, places: Any, values: Any, row: Any
 ) -> int:
@@ -182,7 +182,7 @@ def _step(
     return hits
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _write(boxes: Any, places: Any, values: Any, depth: Any, raced: Any, landed: Any, lands: int, row: Any) -> None:
     """Check and write: lanes whose depth still stands put their fragment, which lands in round ``lands``."""
     written = 0
@@ -201,7 +201,7 @@ def _write(boxes: Any, places: Any, values: Any, depth: Any, raced: Any, landed:
         row[12] += written
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _count_atomics(places: Any, merge: int, row: Any, requests: Any) -> None:
     for lane in range(len(places)):
         places[lane] *= 4  # bytes; inactive lanes stay negative
@@ -214,7 +214,7 @@ def _count_atomics(places: Any, merge: int, row: Any, requests: Any) -> None:
     add_requests(places, len(places), merge, 0, requests)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _per_primitive_raster(
     screen: Any, triangles: Any, drawable: Any, culling: bool, warp: int, merge: int, resident: int,
     nearest: Any, depth: Any, raced: Any, landed: Any, requests: Any, events: Any,

@@ -65,7 +65,7 @@ class TileLists(NamedTuple):
     entries: NDArray[np.int32]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> bool:
     """Whether a triangle and a square tile overlap: no axis of five separates them (touching counts)."""
     right = left + size
@@ -81,7 +81,7 @@ def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, to
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _separates(
     ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, left: Any, top: Any, right: Any, bottom: Any
 ) -> bool:
@@ -96,7 +96,7 @@ def _separates(
     return min(x[0], x[1]) + min(y[0], y[1]) > _ZERO
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
     screen: Any, triangles: Any, drawable: Any, width: int, height: int, tile: int, culling: bool, warp: int,
     rule: int, merge: int, limits: Any, sizes: Any, entries: Any, requests: Any, events: Any,
@@ -146,7 +146,7 @@ def _fill(
     return lost
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, first: int, width: int, height: int, tile: int, culling: bool,
     boxes: Any, events: Any,
@@ -179,7 +179,7 @@ def _boxes(
     return longest
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _count_append(addresses: Any, places: Any, warp: int, rule: int, merge: int, row: Any, requests: Any) -> None:
     """Count one warp's atomicAdd on the counters and the stores of the entries."""
     lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)

@@ -61,7 +61,7 @@ class Visible(NamedTuple):
     depth: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _tile(
     screen: Any, triangles: Any, entries: Any, x_first: int, y_first: int, tile: int, warp: int,
     visible: Any, depth: Any, marks: Any, row: Any,
@@ -99,7 +99,7 @@ def _tile(
                 marks[1, w] = 0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _band(
     screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any,
     tile_row: int, events: Any,
@@ -121,7 +121,7 @@ def _band(
             events[i, 8] = len(listed)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def _tiled_raster(
     screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any, events: Any
 ) -> None:

@@ -65,7 +65,7 @@ def eye_space(matrix: NDArray[Any]) -> EyeSpace:
     return EyeSpace(axes.astype(np.float32), np.where(scales > 1e-12, scales, 0.0).astype(np.float32))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _vertex_shading(
     positions: Any, normals: Any, matrix: Any, axes: Any, width: Any, height: Any, screen: Any, eye_normals: Any
 ) -> None:

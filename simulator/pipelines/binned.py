@@ -1,0 +1,101 @@
+"""Zhang 2025: sort-middle with bins, tiles and quads, trilinear textures, API order or order-independent transparency."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.pipelines.tiled import check_choices
+from simulator.scenes.scene import Scene
+from simulator.scenes.texture import texture_chains
+from simulator.scenes.textured_mesh import geometry
+from simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
+from simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
+from simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, pixel_shader
+from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
+from simulator.stages.zhang2025.primitive_binning import primitive_binning
+from simulator.stages.zhang2025.primitive_compaction import primitive_compaction
+from simulator.stages.zhang2025.rop import KEPT, Order, RopEvent, rop
+from simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
+from simulator.stages.zhang2025.triangle_setup import triangle_setup
+from simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
+
+
+def binned(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    order: Order = "api",
+    texture_filter: Filter = "trilinear",
+    texture_layout: str = "tiled",
+    culling: bool = True,
+    fragments_a_pixel: int = KEPT,
+    opacity: float = 1.0,
+    optimized: bool = True,
+) -> Frame:
+    """Draw a mesh through bins and tiles.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        See ``simulator.pipelines``; at most 2048 pixels on a side.
+    order : {"api", "oit"}
+        Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
+    texture_filter : {"nearest", "bilinear", "trilinear"}
+    texture_layout : {"tiled", "rows"}
+    culling : bool
+        Cull triangles that face away.
+    fragments_a_pixel : int
+        How many a pixel can keep (the original: 4); 0 for all.
+    opacity : float
+        Multiplies every alpha.
+    optimized : bool
+        The kernels after the optimizations that the source lists, or before.
+    """
+    check_choices(
+        order=(order, ("api", "oit")),
+        texture_filter=(texture_filter, tuple(FILTERS)),
+        texture_layout=(texture_layout, ("tiled", "rows")),
+    )
+    if fragments_a_pixel < 0 or not 0.0 <= opacity <= 1.0:
+        raise TilestampError("fragments_a_pixel is 0 or more, opacity between 0 and 1")
+    mesh = geometry(scene)
+    textures = scene.mesh.textures if scene.mesh else ()
+    chains = texture_chains(textures, tiled=texture_layout == "tiled", mips=texture_filter == "trilinear")
+    opaque = order == "api"
+
+    vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
+    slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=culling)
+    primitives, compaction = primitive_compaction(slots, len(mesh.triangles), simt)
+    data, setup = triangle_setup(primitives, simt)
+    bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))
+    tiles, coarse = coarse_rasterizer(data, bins, width, height, simt, hi_z=opaque, unrolled=optimized)
+    fragments, fine = fine_rasterizer(data, tiles, width, height, simt, early_z=opaque, optimized=optimized)
+    stream, shader = pixel_shader(
+        data, tiles, fragments, chains, mesh.texture_ids, simt,
+        texture_filter=texture_filter, opacity=opacity, optimized=optimized,
+    )  # fmt: skip
+    target, depth, winners, resolve = rop(
+        data, tiles, fragments, stream, simt, order=order, limit=fragments_a_pixel, optimized=optimized
+    )
+    image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
+
+    return Frame(
+        image,
+        depth[::-1],
+        [shading, assembly, compaction, setup, binning, coarse, fine, shader, resolve, streaming],
+        triangle_ids=np.where(winners >= 0, mesh.ids[winners], -1).astype(np.int32)[::-1],
+        maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
+        facts={
+            "primitives after culling": len(data.ids),
+            "quads": len(stream.entries),
+            "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
+            "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
+        },
+    )

@@ -1,0 +1,190 @@
+"""PrimitiveAssembly: triangles, frustum clipping, backface culling (Zhang 2025, stage 2). One thread a triangle, 256 a block.
+
+A triangle that stays whole keeps its own slot of the primitive buffer; the pieces of a clipped one go behind all slots,
+by one global atomicAdd a clipped triangle. Culled slots are marked and left to PrimitiveCompaction. The original drops
+every triangle with a vertex behind the eye before it clips, which leaves holes; here those are clipped as well.
+Rows count from the bottom of the picture up to StreamingToFrameBuffer, as in the original.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.atomics import count_atomics
+from models.coalescing import transactions
+from models.launch import Stream
+from models.simt import Simt
+from simulator.scenes.textured_mesh import Geometry
+from simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
+from simulator.stages.zhang2025.vertex_fetch_and_shading import BLOCK, VARYINGS, VERTEX_BYTES, ShadedVertices
+from simulator.work import Work
+
+PRIMITIVE_BYTES = 112  # three vertices and an identifier
+MOST_PIECES = MOST_VERTICES - 2
+_HALF = np.float32(0.5)
+_ONE = np.float32(1.0)
+_ZERO = np.float32(0.0)
+
+
+class PrimitiveAssemblyEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0
+    WARP_LANES = 1
+    CLIPPED = 2  # lanes whose triangle crosses a plane
+    CULLED = 3  # lanes whose triangle is outside or faces away
+    PIECES = 4  # primitives written
+    ATOMIC = 5
+    ATOMIC_LANES = 6
+    ATOMIC_REQUESTS = 7
+    ATOMIC_CONFLICTS = 8
+    ATOMIC_DEPTH = 9
+    LOAD_TRANSACTIONS = 10
+    LOAD_BYTES = 11
+    STORE_TRANSACTIONS = 12
+    STORE_BYTES = 13
+
+
+class Primitives(NamedTuple):
+    """The primitive buffer.
+
+    Parameters
+    ----------
+    screen : ndarray, (P, 3, 4), float32
+        Pixels right and up, depth in [0, 1], w.
+    varyings : ndarray, (P, 3, 9), float32
+    ids : ndarray, (P,), int32
+        Triangle in API order, -1 where culled.
+    """
+
+    screen: NDArray[np.float32]
+    varyings: NDArray[np.float32]
+    ids: NDArray[np.int32]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put(
+    polygon: Any, a: int, b: int, c: int, width: Any, height: Any, culling: bool, screen: Any, varyings: Any
+) -> bool:
+    """Divide by w, map to the screen, store one piece; False where it faces away."""
+    for k in range(3):
+        v = polygon[a if k == 0 else b if k == 1 else c]
+        screen[k, 0] = (v[0] / v[3] + _ONE) * _HALF * width
+        screen[k, 1] = (v[1] / v[3] + _ONE) * _HALF * height
+        screen[k, 2] = (v[2] / v[3] + _ONE) * _HALF
+        screen[k, 3] = v[3]
+        varyings[k] = v[4:]
+    ux, uy = screen[1, 0] - screen[0, 0], screen[1, 1] - screen[0, 1]
+    vx, vy = screen[2, 0] - screen[0, 0], screen[2, 1] - screen[0, 1]
+    area = ux * vy - uy * vx
+    if area < _ZERO and not culling:  # the edge functions want counter-clockwise corners
+        screen[1], screen[2] = screen[2].copy(), screen[1].copy()
+        varyings[1], varyings[2] = varyings[2].copy(), varyings[1].copy()
+    return area > _ZERO or (area < _ZERO and not culling)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _primitive_assembly(
+    clip: Any, varyings: Any, triangles: Any, width: Any, height: Any, culling: bool,
+    screen: Any, out_varyings: Any, ids: Any, events: Any,
+) -> int:  # fmt: skip
+    """Assemble all triangles; returns the slots in use."""
+    polygon = np.empty((MOST_VERTICES, 4 + varyings.shape[1]), np.float32)
+    scratch = np.empty_like(polygon)
+    used = len(triangles)
+    for t in range(len(triangles)):
+        every, some = 63, 0
+        for k in range(3):
+            polygon[k, :4] = clip[triangles[t, k]]
+            polygon[k, 4:] = varyings[triangles[t, k]]
+            code = outcode(polygon[k])
+            every &= code
+            some |= code
+        count = 0 if every else 3 if some == 0 else clip_polygon(polygon, scratch, 3)
+        ids[t] = -1
+        pieces = 0
+        for j in range(1, count - 1):
+            slot = t if count == 3 else used
+            front = _put(polygon, 0, j, j + 1, width, height, culling, screen[slot], out_varyings[slot])
+            ids[slot] = t if front else -1
+            pieces += front
+            used += count > 3
+        if events is not None:
+            row = events[t // BLOCK]
+            row[1] += 1  # WARP_LANES
+            row[2] += count > 3  # CLIPPED
+            row[3] += pieces == 0  # CULLED
+            row[4] += max(1, count - 2)  # PIECES
+    return used
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int, events: Any) -> None:
+    """Vertex fetches through the indices, and the atomics of the clipped lanes, warp by warp."""
+    addresses = np.empty(warp, np.int64)
+    for first in range(0, len(triangles), warp):
+        row = events[first // BLOCK]
+        row[0] += 1  # WARPS
+        for k in range(3):
+            for lane in range(warp):
+                addresses[lane] = triangles[first + lane, k] * VERTEX_BYTES if first + lane < len(triangles) else -1
+            count, size = transactions(addresses, warp, 4, rule)
+            row[10] += count * (VERTEX_BYTES // 4)
+            row[11] += size * (VERTEX_BYTES // 4)
+        for lane in range(warp):
+            addresses[lane] = 0 if first + lane < len(triangles) and clipped[first + lane] else -1
+        lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)
+        row[5] += lanes > 0
+        row[6] += lanes
+        row[7] += merged
+        row[8] += conflicts
+        row[9] += depth
+
+
+def primitive_assembly(
+    mesh: Geometry, vertices: ShadedVertices, width: int, height: int, simt: Simt, *, culling: bool = True
+) -> tuple[Primitives, Work]:
+    """Assemble, clip and cull.
+
+    Parameters
+    ----------
+    mesh : Geometry
+    vertices : ShadedVertices
+    width, height : int
+        Pixels.
+    simt : Simt
+    culling : bool
+        Cull triangles that face away; the original always does.
+
+    Returns
+    -------
+    Primitives
+        All slots in use, culled ones included.
+    Work
+    """
+    count = len(mesh.triangles)
+    x, y, z, w = vertices.clip.T
+    crossing = ((np.abs(x) > w) | (np.abs(y) > w) | (np.abs(z) > w))[mesh.triangles].any(axis=1)
+    slots = count + MOST_PIECES * int(crossing.sum())
+    out = Primitives(
+        np.empty((slots, 3, 4), np.float32), np.empty((slots, 3, VARYINGS), np.float32), np.full(slots, -1, np.int32)
+    )
+    blocks = max(1, -(-count // BLOCK))
+    events = np.zeros((blocks, len(PrimitiveAssemblyEvent)), np.int64)
+    used = _primitive_assembly(*vertices, mesh.triangles, np.float32(width), np.float32(height), culling, *out, events)
+    _count_memory(mesh.triangles, crossing, simt.warp, int(simt.coalescing), int(simt.atomic_merge), events)
+    segment = 128 if simt.coalescing == 2 else 32
+    stores = events[:, PrimitiveAssemblyEvent.PIECES] * (PRIMITIVE_BYTES // 4)  # a lane's words lie 112 bytes apart
+    events[:, PrimitiveAssemblyEvent.STORE_TRANSACTIONS] = stores
+    events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
+    total = events.sum(axis=0)
+    streams = (
+        Stream("vertices_out", "load", int(total[PrimitiveAssemblyEvent.LOAD_BYTES]), len(x) * VERTEX_BYTES),
+        Stream("primitives", "store", int(total[PrimitiveAssemblyEvent.STORE_BYTES]), used * PRIMITIVE_BYTES),
+    )
+    stage = "PrimitiveAssembly"
+    work = Work(stage, stage, PrimitiveAssemblyEvent, events, blocks, BLOCK, streams=streams)
+    return Primitives(*(array[:used] for array in out)), work

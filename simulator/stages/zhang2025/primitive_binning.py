@@ -1,0 +1,156 @@
+"""PrimitiveBinning: assign primitives to 128x128-pixel bins by their boxes (Zhang 2025, stage 5).
+
+One thread a primitive, 256 a block. A mask of 256 bins a thread is transposed by 256 ballots a warp; each thread then
+owns a bin, scans the block's counts, and one thread takes room in the queue by one global atomicAdd a block, in chunks
+of 64 entries. The queue of a bin keeps the order of the primitives.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
+from simulator.work import Work
+
+BLOCK = 256  # threads, and primitives a sub-queue
+BIN = 128  # pixels
+BINS_A_ROW = 16
+MAX_BINS = 256
+CHUNK = 64  # queue entries
+
+
+class PrimitiveBinningEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0  # each runs 256 ballots and the scans
+    WARP_LANES = 1
+    BIN_STEPS = 2  # warp steps over the bins of the boxes
+    ENTRIES = 3  # queue entries written
+    CHUNKS = 4  # of 64 entries, taken from the allocator
+    ATOMIC = 5
+    ATOMIC_LANES = 6
+    ATOMIC_REQUESTS = 7
+    ATOMIC_DEPTH = 8
+    LOAD_TRANSACTIONS = 9
+    LOAD_BYTES = 10
+    STORE_TRANSACTIONS = 11
+    STORE_BYTES = 12
+
+
+class BinQueues(NamedTuple):
+    """Primitives by bin, in order.
+
+    Parameters
+    ----------
+    starts : ndarray, (257,), int64
+        Bin x + 16 y holds entries starts[bin]..starts[bin + 1] - 1.
+    entries : ndarray, int32
+    """
+
+    starts: NDArray[np.int64]
+    entries: NDArray[np.int32]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
+    """First and last bin of a box in each direction."""
+    left = min(max(int(box[0]) // BIN, 0), columns - 1)
+    bottom = min(max(int(box[1]) // BIN, 0), rows - 1)
+    right = min(max(int(box[2]) // BIN, 0), columns - 1)
+    top = min(max(int(box[3]) // BIN, 0), rows - 1)
+    return left, right, bottom, top
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: Any) -> None:
+    """Entries by sub-queue and bin, ``counts`` (blocks, 256)."""
+    steps = 0
+    for p in range(len(boxes)):
+        left, right, bottom, top = _bins(boxes[p], columns, rows)
+        for y in range(bottom, top + 1):
+            for x in range(left, right + 1):
+                counts[p // BLOCK, x + y * BINS_A_ROW] += 1
+        steps = max(steps, (right - left + 1) * (top - bottom + 1))
+        if p % warp == warp - 1 or p == len(boxes) - 1:
+            if events is not None:
+                events[p // BLOCK, 2] += steps  # BIN_STEPS
+            steps = 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill(boxes: Any, columns: int, rows: int, cursor: Any, entries: Any) -> None:
+    """Write the queues; ``cursor`` (256,) runs ahead in each bin."""
+    for p in range(len(boxes)):
+        left, right, bottom, top = _bins(boxes[p], columns, rows)
+        for y in range(bottom, top + 1):
+            for x in range(left, right + 1):
+                b = x + y * BINS_A_ROW
+                entries[cursor[b]] = p
+                cursor[b] += 1
+
+
+def primitive_binning(
+    boxes: NDArray[np.float32], width: int, height: int, simt: Simt, *, triangles: int = 0
+) -> tuple[BinQueues, Work]:
+    """Bin all primitives.
+
+    Parameters
+    ----------
+    boxes : ndarray, (P, 4), float32
+        Left, bottom, right, top in pixels.
+    width, height : int
+        Pixels: at most 16 bins each way.
+    simt : Simt
+    triangles : int
+        Triangles of the model: the original launches blocks for twice as many primitives.
+
+    Raises
+    ------
+    TilestampError
+        A picture of more than 2048 pixels on a side.
+    """
+    columns, rows = -(-width // BIN), -(-height // BIN)
+    if max(columns, rows) > BINS_A_ROW:
+        raise TilestampError(
+            f"the binned pipeline has 16x16 bins of 128 pixels: {width}x{height} does not fit in 2048x2048"
+        )
+    work_blocks = max(1, -(-len(boxes) // BLOCK))
+    blocks = max(work_blocks, -(-2 * triangles // BLOCK))
+    events = np.zeros((blocks, len(PrimitiveBinningEvent)), np.int64)
+    counts = np.zeros((work_blocks, MAX_BINS), np.int64)
+    _count(boxes, columns, rows, simt.warp, counts, events)
+    starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))]).astype(np.int64)
+    entries = np.empty(int(starts[-1]), np.int32)
+    _fill(boxes, columns, rows, starts[:-1].copy(), entries)
+    _add_costs(events[:work_blocks], counts, len(boxes), simt)
+    total = events.sum(axis=0)
+    streams = (
+        Stream("compacted", "load", int(total[10]), len(boxes) * PRIMITIVE_BYTES),
+        Stream("bin_queue", "store", int(total[12]), 4 * len(entries) + 8 * MAX_BINS * work_blocks),
+    )
+    stage = "PrimitiveBinning"
+    return BinQueues(starts, entries), Work(stage, stage, PrimitiveBinningEvent, events, blocks, BLOCK, streams=streams)
+
+
+def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives: int, simt: Simt) -> None:
+    """What follows from the counts: chunks, one atomicAdd a block, memory."""
+    event = PrimitiveBinningEvent
+    segment = 128 if simt.coalescing == 2 else 32
+    lanes = np.full(len(events), BLOCK)
+    lanes[-1] = primitives - (len(events) - 1) * BLOCK
+    events[:, event.WARPS] = BLOCK // simt.warp
+    events[:, event.WARP_LANES] = lanes
+    events[:, event.ENTRIES] = counts.sum(axis=1)
+    events[:, event.CHUNKS] = (-(-counts // CHUNK)).sum(axis=1)
+    for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
+        events[:, name] = 1
+    events[:, event.LOAD_TRANSACTIONS] = 6 * lanes + events[:, event.ENTRIES]  # corners 112 bytes apart, queue bases
+    events[:, event.LOAD_BYTES] = events[:, event.LOAD_TRANSACTIONS] * segment
+    events[:, event.STORE_TRANSACTIONS] = events[:, event.ENTRIES] + 2 * BLOCK * 4 // segment
+    events[:, event.STORE_BYTES] = events[:, event.STORE_TRANSACTIONS] * segment

@@ -1,0 +1,79 @@
+"""PrimitiveCompaction: stream compaction of the primitive buffer in one launch (Zhang 2025, stage 3).
+
+A cooperative launch of one thread a slot, 256 a block, in three phases with grid synchronisation between them: flags
+and block scans, a scan of the block sums, the copy. All blocks must be resident at once, so the machine limits the
+primitive buffer, which has four slots for each triangle: "currently we cannot process model have more than 10k".
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+from models.launch import Stream
+from models.machine import Machine
+from models.occupancy import residency
+from models.simt import Simt
+from simulator.stages.thread_per_item import Access, record_transactions
+from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
+from simulator.work import Work
+
+BLOCK = 256  # threads
+REGISTERS = 40  # a thread, from his profile
+SLOTS_A_TRIANGLE = 4
+
+
+class PrimitiveCompactionEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0  # flag, scan in the block, copy
+    KEPT = 1  # lanes that copy their primitive
+    GRID_SYNC = 2  # grid synchronisations, one for each block that arrives
+    LOAD_TRANSACTIONS = 3
+    LOAD_BYTES = 4
+    STORE_TRANSACTIONS = 5
+    STORE_BYTES = 6
+
+
+def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple[Primitives, Work]:
+    """Close the gaps of culled primitives.
+
+    Parameters
+    ----------
+    slots : Primitives
+    triangles : int
+        Triangles drawn: the launch covers four slots for each.
+    simt : Simt
+
+    Returns
+    -------
+    Primitives, Work
+    """
+    kept = np.flatnonzero(slots.ids >= 0)
+    blocks = max(1, -(-max(len(slots.ids), SLOTS_A_TRIANGLE * triangles) // BLOCK))
+    events = np.zeros((blocks, len(PrimitiveCompactionEvent)), np.int64)
+    warps = BLOCK // simt.warp
+    copies = np.bincount(kept // BLOCK, minlength=blocks)
+    ids = record_transactions(Access("primitives", PRIMITIVE_BYTES, 1), simt)
+    segment = 128 if simt.coalescing == 2 else 32
+    words = copies * (PRIMITIVE_BYTES // 4)
+    events[:, PrimitiveCompactionEvent.WARPS] = warps
+    events[:, PrimitiveCompactionEvent.KEPT] = copies
+    events[:, PrimitiveCompactionEvent.GRID_SYNC] = 2
+    events[:, PrimitiveCompactionEvent.LOAD_TRANSACTIONS] = warps * ids[0] + words
+    events[:, PrimitiveCompactionEvent.LOAD_BYTES] = warps * ids[1] + words * segment
+    events[:, PrimitiveCompactionEvent.STORE_TRANSACTIONS] = words
+    events[:, PrimitiveCompactionEvent.STORE_BYTES] = words * segment
+    total = events.sum(axis=0)
+    streams = (
+        Stream("primitives", "load", int(total[4]), blocks * BLOCK * PRIMITIVE_BYTES),
+        Stream("compacted", "store", int(total[6]), len(kept) * PRIMITIVE_BYTES),
+    )
+    stage = "PrimitiveCompaction"
+    work = Work(stage, stage, PrimitiveCompactionEvent, events, blocks, BLOCK, streams=streams)
+    return Primitives(*(array[kept] for array in slots)), work
+
+
+def most_triangles(machine: Machine) -> int:
+    """Triangles that the cooperative launch can take on a machine: resident blocks x 256 threads / 4 slots."""
+    resident = residency(machine, BLOCK, REGISTERS, 0).blocks
+    return machine.sm.count * resident * BLOCK // SLOTS_A_TRIANGLE
