@@ -145,7 +145,7 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
         time += (moment - now) * stretch
         now = moment
         if start:
-            s = freed if vacant == 1 and ended > 0 else np.argmax(free)
+            s = freed if vacant == free[freed] else np.argmax(free)
         # the SM's own clock up to now, before its load changes
         clock[s] += (now - read[s]) / max(1.0, load[s])
         read[s] = now

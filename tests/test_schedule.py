@@ -151,6 +151,14 @@ def test_each_warp_of_a_persistent_block_draws_its_own_item():
     assert work_cycles(blocks) > 15 * work_cycles(warps)
 
 
+def test_blocks_that_end_faster_than_they_start_leave_places_free_on_many_sms():
+    work = np.zeros(4096)
+    work[::3] = np.random.default_rng(2).exponential(20000, len(work[::3]))
+    got = schedule(launch(4096, CHAIN_ALU=work), H200, NOTHING)
+    longest = work.max() * H200.latency.alu_cycles
+    assert longest < work_cycles(got) < 4 * longest
+
+
 def test_units_beyond_the_most_are_played_in_groups(monkeypatch):
     what = launch(5000, FP32=1000)
     exact = schedule(what, GTX280, NOTHING)
