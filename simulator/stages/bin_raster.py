@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
-from models.simt import Coalescing, Simt
+from models.simt import Simt
 from simulator.stages.bin_raster_batch import BIN_SEGMENT, BLOCK, ENTRY_BYTES, BinInput, BinRasterEvent, _play_batch
-from simulator.stages.bin_raster_cover import HEADER_BYTES, check_machine
+from simulator.stages.bin_raster_cover import HEADER_BYTES, transaction_bytes
 from simulator.work import Work
 
 RELEASES = ("1.1", "nvdiffrast")
@@ -45,14 +45,17 @@ class BinQueues(NamedTuple):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _play_batches(given, batch, triangles, counts, entries, events):
-    """All batches; each counts (``entries`` None) or fills by its own row of ``counts``."""
+def _count_batches(given, batch, counts, events):
+    """Count each batch's entries by bin, and its events, into its own rows."""
     for b in prange(counts.shape[0]):
-        end = min((b + 1) * batch, triangles)
-        if events is None:
-            _play_batch(given, b * batch, end, counts[b], entries, None)
-        else:
-            _play_batch(given, b * batch, end, counts[b], entries, events[b])
+        _play_batch(given, b, batch, counts[b], None, events[b])
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _fill_batches(given, batch, counts, entries):
+    """Write each batch's entries from the places in its row of ``counts``; only count them where ``entries`` is None."""
+    for b in prange(counts.shape[0]):
+        _play_batch(given, b, batch, counts[b], entries, None)
 
 
 def bin_raster(
@@ -97,11 +100,10 @@ def bin_raster(
         For a viewport or a machine that the original cannot use.
     """
     check_viewport(width, height, release)
-    check_machine(simt, "bin_raster")
+    segment_bytes = transaction_bytes(simt, "bin_raster")
     bins_x, bins_y = -(-width // BIN_PIXELS), -(-height // BIN_PIXELS)
-    bytes_together = 32 if simt.coalescing == Coalescing.WARP_SECTORS else 128
     given = BinInput(
-        setup.subtriangles, setup.headers, setup.misc, 8 * width, 8 * height, bins_x, bins_y, simt.coalescing, bytes_together
+        setup.subtriangles, setup.headers, setup.misc, 8 * width, 8 * height, bins_x, bins_y, segment_bytes
     )
     triangles = len(setup.subtriangles)
     batch = batch_size(triangles)
@@ -109,14 +111,17 @@ def bin_raster(
     counts = np.zeros((batches, bins_x * bins_y), np.int64)
     events = np.zeros((batches, len(BinRasterEvent)), np.int64) if counting else None
     with parallel_chunksize(1):
-        _play_batches(given, batch, triangles, counts, None, events)
+        if events is None:
+            _fill_batches(given, batch, counts, None)
+        else:
+            _count_batches(given, batch, counts, events)
         starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))])
         cursors = starts[:-1] + np.cumsum(counts, axis=0) - counts
         entries = np.empty(starts[-1], np.int32)
-        _play_batches(given, batch, triangles, cursors, entries, None)
+        _fill_batches(given, batch, cursors, entries)
     queues = BinQueues(starts, entries, counts, _stream_totals(counts), bins_x, bins_y)
     segments = int((-(-counts // BIN_SEGMENT)).sum())
-    work = _work(events, setup, len(entries), segments, bytes_together)
+    work = _work(events, setup, len(entries), segments, segment_bytes)
     overflow = capacity is not None and segments > capacity
     facts: dict[str, Any] = {
         "num_bin_segments": segments,
@@ -159,9 +164,7 @@ def _stream_totals(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     return totals
 
 
-def _work(
-    events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: int, bytes_together: int
-) -> Work:
+def _work(events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: int, segment_bytes: int) -> Work:
     """Put the blocks' own rows in front, and name the buffers."""
     rest = np.zeros((STREAMS, len(BinRasterEvent)), np.int64)
     if events is None:
@@ -170,7 +173,7 @@ def _work(
         E = BinRasterEvent
         rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
         rest[:, [E.LOAD, E.LOAD_TRANSACTIONS]] = WARPS  # each warp reads the number of triangles
-        rest[:, E.LOAD_BYTES] = WARPS * bytes_together
+        rest[:, E.LOAD_BYTES] = WARPS * segment_bytes
     table = np.vstack([rest, events])
     visible = int(np.sum(setup.subtriangles, dtype=np.int64))
     reads = int(table[:, BinRasterEvent.LOAD_BYTES].sum())
@@ -181,9 +184,7 @@ def _work(
         Stream("headers", "load", max(reads - counts, 0), visible * HEADER_BYTES),
         Stream("bin_queues", "store", writes, min(pairs * ENTRY_BYTES, segments * SEGMENT_BYTES)),
     )
-    return Work(
-        "bin_raster", "binRaster", BinRasterEvent, table, STREAMS, BLOCK, SHARED_BYTES, "block_queue", streams
-    )
+    return Work("bin_raster", "binRaster", BinRasterEvent, table, STREAMS, BLOCK, SHARED_BYTES, "block_queue", streams)
 
 
 def _counters(work: Work) -> dict[str, tuple[int, int]]:

@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import contiguous
 from simulator.stages.bin_raster_cover import (
     BIN_SIDE_LOG2,
     SINGLE_TRIANGLE,
@@ -88,8 +87,7 @@ class BinInput(NamedTuple):
     half_y: int
     bins_x: int
     bins_y: int
-    rule: int  # coalescing rule of the machine
-    segment_bytes: int  # of its transactions
+    segment_bytes: int  # of the machine's memory transactions
 
 
 class BinScratch(NamedTuple):
@@ -99,14 +97,13 @@ class BinScratch(NamedTuple):
     before: NDArray[np.int64]  # (bins,) entries before the round
     stamp: NDArray[np.int64]  # (steps, bins) last warp and memory segment that wrote to the bin at that step
     warps: NDArray[np.int64]  # (1,) warps so far
-    addresses: NDArray[np.int64]  # (32,)
 
 
 @njit(cache=True, nogil=True)
 def _new_scratch(bins, counting):
     steps = bins if counting else 0
     stamp = np.zeros((steps, bins), np.int64)
-    return BinScratch(np.empty(RING, np.int64), np.zeros(bins, np.int64), stamp, np.zeros(1, np.int64), np.empty(WARP, np.int64))
+    return BinScratch(np.empty(RING, np.int64), np.zeros(bins, np.int64), stamp, np.zeros(1, np.int64))
 
 
 @njit(cache=True, nogil=True)
@@ -153,18 +150,10 @@ def _read_step(given, ring, read, write, first, end, events):
         events[BinRasterEvent.VISIBLE_LANES] += visible
         events[BinRasterEvent.ENTRIES] += write - start
         events[BinRasterEvent.OVERFLOWS] += go_on < last
-        _count_load(events, warps, *_byte_loads(first, last, given.rule))
+        for start in range(first, last, WARP):  # a byte a lane
+            segments = (min(start + WARP, last) - 1) // given.segment_bytes - start // given.segment_bytes + 1
+            _count_load(events, 1, segments, segments * given.segment_bytes)
     return go_on, write
-
-
-@njit(cache=True, nogil=True)
-def _byte_loads(first, last, rule):
-    """Transactions and bytes of warps that read one byte a lane."""
-    count, size = 0, 0
-    for start in range(first, last, WARP):
-        n, b = contiguous(start, min(WARP, last - start), rule)
-        count, size = count + n, size + b
-    return count, size
 
 
 @njit(cache=True, nogil=True)
@@ -255,7 +244,7 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
     events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
     events[BinRasterEvent.SHARED_ATOMIC] += ors
     events[BinRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.rule, scratch.addresses))
+    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
 
 
 @njit(cache=True, nogil=True)
@@ -281,11 +270,12 @@ def _segments(entries):
 
 
 @njit(cache=True, nogil=True)
-def _play_batch(given, first, end, counts, entries, events):
-    """Bin the input triangles first..end-1.
+def _play_batch(given, b, batch, counts, entries, events):
+    """Bin the input triangles of batch b, of ``batch`` triangles.
 
     ``counts`` holds the next place of each bin: from 0 when counting (``entries`` None), into ``entries`` when filling.
     """
+    first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
     scratch, boxes = _new_scratch(counts.size, events is not None), _new_boxes()
     read, write = 0, 0
     while True:

@@ -11,11 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import SECTOR_BYTES, SEGMENT_BYTES, transactions
+from models.coalescing import SECTOR_BYTES, SEGMENT_BYTES
 from models.errors import TilestampError
 from models.simt import Coalescing, Simt
 
-WARP_SECTORS = int(Coalescing.WARP_SECTORS)
 WARP = 32  # lanes; the original's ballots and its masks of 32 bits know no other width
 HEADER_BYTES = 16  # six int16 coordinates and one word
 BIN_SIDE_LOG2 = 11  # a bin is 128 pixels of 16 sub-pixels wide
@@ -56,7 +55,14 @@ def _entry_slot(entry, misc):
 @njit(cache=True, nogil=True)
 def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
     """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
-    x0, y0, x1, y1, x2, y2 = header[0] + dx, header[1] + dy, header[2] + dx, header[3] + dy, header[4] + dx, header[5] + dy
+    x0, y0, x1, y1, x2, y2 = (
+        header[0] + dx,
+        header[1] + dy,
+        header[2] + dx,
+        header[3] + dy,
+        header[4] + dx,
+        header[5] + dy,
+    )
     low_x = min(max(min(x0, x1, x2) >> shift, 0), last_x)
     low_y = min(max(min(y0, y1, y2) >> shift, 0), last_y)
     box = boxes.box[lane]
@@ -133,26 +139,28 @@ def _walk_votes(boxes, lanes, steps, stride):
 
 
 @njit(cache=True, nogil=True)
-def _header_load(slot, lanes, rule, addresses):
-    """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane."""
-    segment, together = (SECTOR_BYTES, WARP) if rule == WARP_SECTORS else (SEGMENT_BYTES, WARP // 4)
+def _header_load(slot, lanes, segment_bytes):
+    """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
+
+    The rule is that of ``models.coalescing``: distinct sectors of the warp, or distinct lines of each quarter-warp.
+    """
+    together = WARP if segment_bytes == SECTOR_BYTES else WARP // 4
     distinct = 0
-    last = np.int64(-1)
     for lane in range(lanes):
-        here = slot[lane] * HEADER_BYTES // segment
-        if lane % together == 0:
-            last = -1
-        if here < last:  # not in order: let the general rule look at every pair
-            for i in range(lanes):
-                addresses[i] = slot[i] * HEADER_BYTES
-            return transactions(addresses, lanes, HEADER_BYTES, rule)
-        distinct += here != last
-        last = here
-    return distinct, distinct * segment
+        here = slot[lane] * HEADER_BYTES // segment_bytes
+        new = True
+        for other in range(lane - 1, lane - lane % together - 1, -1):
+            there = slot[other] * HEADER_BYTES // segment_bytes
+            if there == here:
+                new = False
+            if there <= here:  # slots mostly ascend: nothing nearer lies further back
+                break
+        distinct += new
+    return distinct, distinct * segment_bytes
 
 
-def check_machine(simt: Simt, stage: str) -> None:
-    """Refuse a machine that cannot run the original.
+def transaction_bytes(simt: Simt, stage: str) -> int:
+    """Bytes of one memory transaction; refuses a machine that cannot run the original.
 
     Parameters
     ----------
@@ -161,6 +169,11 @@ def check_machine(simt: Simt, stage: str) -> None:
     stage : str
         Who asks, for the message.
 
+    Returns
+    -------
+    int
+        128 (lines) or 32 (sectors).
+
     Raises
     ------
     TilestampError
@@ -168,3 +181,4 @@ def check_machine(simt: Simt, stage: str) -> None:
     """
     if simt.warp != WARP or simt.coalescing == Coalescing.HALF_WARP_SEGMENTS:
         raise TilestampError(f"{stage}: cudaraster votes over warps of 32 and needs compute capability 2.0 or later")
+    return SECTOR_BYTES if simt.coalescing == Coalescing.WARP_SECTORS else SEGMENT_BYTES

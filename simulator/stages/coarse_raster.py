@@ -15,9 +15,9 @@ from numba import njit, parallel_chunksize, prange
 from numpy.typing import NDArray
 
 from models.launch import Stream
-from models.simt import Coalescing, Simt
-from simulator.stages.bin_raster import BinQueues, check_viewport
-from simulator.stages.bin_raster_cover import HEADER_BYTES, check_machine
+from models.simt import Simt
+from simulator.stages.bin_raster import STREAMS, BinQueues, check_viewport
+from simulator.stages.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
 from simulator.stages.coarse_raster_bin import (
     BIN_TILES,
     BLOCK,
@@ -33,13 +33,16 @@ from simulator.work import Work
 TILE_PIXELS = 8
 SEGMENT_BYTES = TILE_SEGMENT * ENTRY_BYTES + 8  # entries, next and count
 SHARED_BYTES = 44320
+WARPS = BLOCK // WARP
 SORT_TOTAL = (1 << 24) - 1  # bins are sorted by the low 24 bits of their total
 
 
 class TileQueues(NamedTuple):
     """The queues of all tiles, as fine raster reads them."""
 
-    starts: NDArray[np.int64]  # (tiles + 1,) where a tile's entries start, tile = column + row * tiles_x from the bottom
+    starts: NDArray[
+        np.int64
+    ]  # (tiles + 1,) where a tile's entries start, tile = column + row * tiles_x from the bottom
     entries: NDArray[np.int32]  # (emits,) slot of header and data, in exact input order
     active: NDArray[np.int32]  # (active,) tiles in the order in which fine raster draws them
     tiles_x: int
@@ -47,14 +50,17 @@ class TileQueues(NamedTuple):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _play_bins(given, order, counts, queues, events):
-    """All bins in ``order``; each counts (``queues`` None) or fills by its own row of ``counts``."""
+def _count_bins(given, order, counts, events):
+    """Count each bin's emits by tile, and its events, into its own rows."""
     for i in prange(order.size):
-        b = order[i]
-        if events is None:
-            _play_bin(given, b, counts[b], queues, None)
-        else:
-            _play_bin(given, b, counts[b], queues, events[i])
+        _play_bin(given, order[i], counts[order[i]], None, events[i])
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _fill_bins(given, order, counts, entries):
+    """Write each bin's emits from the places in its row of ``counts``; only count them where ``entries`` is None."""
+    for i in prange(order.size):
+        _play_bin(given, order[i], counts[order[i]], entries, None)
 
 
 def coarse_raster(
@@ -105,7 +111,6 @@ def coarse_raster(
         For a viewport or a machine that the original cannot use.
     """
     check_viewport(width, height, release)
-    check_machine(simt, "coarse_raster")
     given = _input(bin_queues, setup, width, height, simt)
     order = bin_order(np.diff(bin_queues.starts), deferred_clear)
     bins = len(bin_queues.starts) - 1
@@ -114,12 +119,15 @@ def coarse_raster(
     bin_tiles = _bin_tiles(given, bins)
     in_frame = bin_tiles >= 0
     with parallel_chunksize(1):
-        _play_bins(given, order, counts, None, events)
+        if events is None:
+            _fill_bins(given, order, counts, None)
+        else:
+            _count_bins(given, order, counts, events)
         starts = np.zeros(given.tiles_x * given.tiles_y + 1, np.int64)
         starts[bin_tiles[in_frame] + 1] = counts[in_frame]
         np.cumsum(starts, out=starts)
         entries = np.empty(starts[-1], np.int32)
-        _play_bins(given, order, np.where(in_frame, starts[bin_tiles], 0), entries, None)
+        _fill_bins(given, order, np.where(in_frame, starts[bin_tiles], 0), entries)
     used = in_frame[order] & (deferred_clear | (counts[order] > 0))
     active = bin_tiles[order][used].astype(np.int32)
     segments = int((-(-counts // TILE_SEGMENT)).sum())
@@ -158,8 +166,7 @@ def _input(queues: BinQueues, setup: Any, width: int, height: int, simt: Simt) -
         queues.bins_x,
         -(-width // TILE_PIXELS),
         -(-height // TILE_PIXELS),
-        int(simt.coalescing),
-        32 if simt.coalescing == Coalescing.WARP_SECTORS else 128,
+        transaction_bytes(simt, "coarse_raster"),
     )
 
 
@@ -181,15 +188,27 @@ def _work(
         events = np.zeros((0, len(E)), np.int64)
     else:
         rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
+        rest[:, [E.LOAD, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]] = _sort_loads(len(given.starts) - 1, given.segment_bytes)
         events[:, E.ACTIVE_TILES] = active
     table = np.vstack([rest, events])
     entries = len(given.entries) * ENTRY_BYTES
     streams = (
         Stream("bin_queues", "load", entries, entries),
-        Stream("headers", "load", max(int(table[:, E.LOAD_BYTES].sum()) - entries, 0), len(given.headers) * HEADER_BYTES),
+        Stream(
+            "headers", "load", max(int(table[:, E.LOAD_BYTES].sum()) - entries, 0), len(given.headers) * HEADER_BYTES
+        ),
         Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
     )
     return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
+
+
+def _sort_loads(bins: int, segment_bytes: int) -> tuple[int, int, int]:
+    """Loads, transactions and bytes of one block that sorts the bins: two a warp, and each bin's total of 16 streams."""
+    loads = 2 * WARPS + STREAMS * -(-bins // WARP)
+    lines = (
+        STREAMS * -(-bins * STREAMS * ENTRY_BYTES // segment_bytes) // max(STREAMS * ENTRY_BYTES // segment_bytes, 1)
+    )
+    return loads, 2 * WARPS + lines, (2 * WARPS + lines) * segment_bytes
 
 
 def _counters(work: Work) -> dict[str, tuple[int, int]]:

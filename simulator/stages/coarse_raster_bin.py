@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import contiguous
 from simulator.stages.bin_raster_cover import (
     SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
@@ -88,8 +87,7 @@ class CoarseInput(NamedTuple):
     bins_x: int
     tiles_x: int
     tiles_y: int
-    rule: int  # coalescing rule of the machine
-    segment_bytes: int  # of its transactions
+    segment_bytes: int  # of the machine's memory transactions
 
 
 class Place(NamedTuple):
@@ -155,7 +153,7 @@ def _emit_warp(case, boxes, lanes, counts, queues):
 
 
 @njit(cache=True, nogil=True)
-def _count_warp(given, case, largest, union, boxes, lanes, first, addresses, events):
+def _count_warp(given, case, largest, union, boxes, lanes, first, events):
     """Count what a warp's loads and its case cost."""
     area, indirect = 0, False
     for lane in range(lanes):
@@ -177,7 +175,7 @@ def _count_warp(given, case, largest, union, boxes, lanes, first, addresses, eve
         ors, replays = _walk_votes(boxes, lanes, largest, BIN_TILES)
     events[CoarseRasterEvent.SHARED_ATOMIC] += ors
     events[CoarseRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.rule, addresses))
+    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
 
 
 @njit(cache=True, nogil=True)
@@ -237,7 +235,9 @@ def _count_merge(given, b, events):
             taken, write = taken + size, write + size
             warps = (size + WARP - 1) // WARP
             events[CoarseRasterEvent.MERGE_WARPS] += warps
-            _count_load(events, warps, *contiguous(0, size * ENTRY_BYTES, given.rule))
+            _count_load(events, 2, 2, 2 * given.segment_bytes)  # its count and the link to the next
+            segments = (size * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes
+            _count_load(events, warps, segments, segments * given.segment_bytes)
         read += min(BLOCK, write - read)
 
 
@@ -249,7 +249,7 @@ def _play_bin(given, b, counts, queues, events):
     filling.
     """
     boxes, place = _new_boxes(), _place(given, b)
-    before, addresses = np.zeros(TILES, np.int64), np.empty(WARP, np.int64)
+    before = np.zeros(TILES, np.int64)
     start, end = given.starts[b], given.starts[b + 1]
     if events is not None:
         _count_merge(given, b, events)
@@ -262,7 +262,7 @@ def _play_bin(given, b, counts, queues, events):
             lanes = min(WARP, read + m - first)
             case, largest, union = _load_warp(given, place, first, lanes, boxes)
             if events is not None:
-                _count_warp(given, case, largest, union, boxes, lanes, first, addresses, events)
+                _count_warp(given, case, largest, union, boxes, lanes, first, events)
             _emit_warp(case, boxes, lanes, counts, queues)
         if events is not None:
             events[CoarseRasterEvent.ROUNDS] += 1

@@ -1,0 +1,264 @@
+"""FreePipe, one warp: lanes in lockstep, as long as the largest triangle among them (Liu et al. 2010).
+
+A thread scans its triangle's box in two nested loops. Lanes come together again after each row, so a warp runs, for
+each row that any lane still has, as many steps as the widest box among those lanes. Lanes whose triangle needs no
+clipping go first; then the others scan the triangles of their clipped polygons, one after another.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.atomics import CHUNK_BYTES, SECTOR
+from models.coalescing import transactions
+from simulator.stages.freepipe_triangle import CLIPPED, INSIDE, _fixed_depth, _start_edges
+
+WARP = 32
+INDEX_BYTES = 4
+POSITION_BYTES = 16
+
+
+class FreePipeEvent(IntEnum):
+    """Events of one block, a column each."""
+
+    WARPS = 0  # warps with a triangle
+    LANES_IN = 1  # triangles
+    CLIP_WARPS = 2  # warps in which a lane clips
+    CLIP_LANES = 3
+    SETUP_STEPS = 4  # warp executions of the set-up of a scan
+    SETUP_LANES = 5
+    ROW_STEPS = 6  # turns of the outer loop
+    ROW_LANES = 7
+    WARP_STEPS = 8  # turns of the inner loop: one sample test of each lane
+    SAMPLE_TESTS = 9  # lanes of those
+    SAMPLE_HITS = 10
+    READS = 11  # early: loads of the pixel before the atomic
+    ATOMIC = 12
+    ATOMIC_LANES = 13
+    ATOMIC_REQUESTS = 14
+    ATOMIC_CONFLICTS = 15
+    ATOMIC_DEPTH = 16
+    LOAD_TRANSACTIONS = 17
+    LOAD_BYTES = 18
+    CHAIN_STEPS = 19  # steps of the block's longest warp, for what nothing else hides
+
+
+class Lanes(NamedTuple):
+    """One warp: scratch space of a worker."""
+
+    piece: NDArray[np.int64]  # (32,) the triangle that each lane scans, -1: none
+    row: NDArray[np.int64]  # (32, 9) edge functions at the row's first pixel, and their steps
+    pixel: NDArray[np.int64]  # (32, 3) edge functions at the pixel
+    row_depth: NDArray[np.float32]  # (32,)
+    depth: NDArray[np.float32]  # (32,)
+    address: NDArray[np.int64]  # (32,) of the lanes that hit, side by side
+    value: NDArray[np.uint64]  # (32,)
+    rank: NDArray[np.int64]  # (32,) place of each hit among those at its address
+
+
+@njit(cache=True, nogil=True)
+def _new_lanes():
+    return Lanes(
+        np.empty(WARP, np.int64),
+        np.empty((WARP, 9), np.int64),
+        np.empty((WARP, 3), np.int64),
+        np.empty(WARP, np.float32),
+        np.empty(WARP, np.float32),
+        np.empty(WARP, np.int64),
+        np.empty(WARP, np.uint64),
+        np.empty(WARP, np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _count_vertices(triangles, t0, lanes, simt, address, row):
+    """Loads of three indices and three positions a lane."""
+    for k in range(3):
+        for lane in range(lanes):
+            address[lane] = (t0 + lane) * 3 * INDEX_BYTES + INDEX_BYTES * k
+        count, size = transactions(address, lanes, INDEX_BYTES, simt.coalescing)
+        for lane in range(lanes):
+            address[lane] = np.int64(triangles[t0 + lane, k]) * POSITION_BYTES
+        more, more_size = transactions(address, lanes, POSITION_BYTES, simt.coalescing)
+        row[FreePipeEvent.LOAD_TRANSACTIONS] += count + more
+        row[FreePipeEvent.LOAD_BYTES] += size + more_size
+
+
+@njit(cache=True, nogil=True)
+def _start_rows(pieces, lanes):
+    """Set each lane up at its box's first pixel; returns lanes that have a piece and the most rows of any."""
+    active, most = 0, 0
+    for lane in range(WARP):
+        p = lanes.piece[lane]
+        if p >= 0:
+            active += 1
+            box = pieces.box[p]
+            _start_edges(pieces.corner[p], box[0], box[2], lanes.row[lane])
+            lanes.row_depth[lane] = pieces.depth[p, 0]
+            most = max(most, np.int64(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
+    return active, most
+
+
+@njit(cache=True, nogil=True)
+def _start_row(pieces, lanes, r):
+    """Let the lanes that have row r begin it; returns how many those are, and the widest box among them."""
+    active, widest = 0, 0
+    for lane in range(WARP):
+        p = lanes.piece[lane]
+        if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
+            active += 1
+            widest = max(widest, np.int64(pieces.box[p, 1] - pieces.box[p, 0] + 1))
+            for k in range(3):
+                lanes.pixel[lane, k] = lanes.row[lane, k]
+                lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
+            lanes.depth[lane] = lanes.row_depth[lane]
+            lanes.row_depth[lane] += pieces.depth[p, 2] * np.float32(16)
+    return active, widest
+
+
+@njit(cache=True, nogil=True)
+def _step(pieces, lanes, r, c, width, word_bytes, ids):
+    """Test pixel (c, r) of every lane's box; returns lanes that tested, and those that hit, side by side."""
+    tests, hits = 0, 0
+    for lane in range(WARP):
+        p = lanes.piece[lane]
+        if p < 0 or pieces.box[p, 2] + r > pieces.box[p, 3] or pieces.box[p, 0] + c > pieces.box[p, 1]:
+            continue
+        tests += 1
+        f = lanes.pixel[lane]
+        if f[0] | f[1] | f[2] >= 0:
+            pixel = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0] + c
+            lanes.address[hits] = pixel * word_bytes
+            if ids:
+                lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
+            hits += 1
+        for k in range(3):
+            f[k] -= lanes.row[lane, 4 + 2 * k]
+        lanes.depth[lane] += pieces.depth[p, 1] * np.float32(16)
+    return tests, hits
+
+
+@njit(cache=True, nogil=True)
+def _early(lanes, hits, t0, frame, word_bytes, simt, row):
+    """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
+    count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
+    row[FreePipeEvent.READS] += 1
+    row[FreePipeEvent.LOAD_TRANSACTIONS] += count
+    row[FreePipeEvent.LOAD_BYTES] += size
+    kept = 0
+    for i in range(hits):
+        value = lanes.value[i] + np.uint64(t0)
+        if frame[lanes.address[i] // word_bytes] > value:
+            lanes.address[kept], lanes.value[kept] = lanes.address[i], value
+            kept += 1
+    for i in range(kept):
+        pixel = lanes.address[i] // word_bytes
+        frame[pixel] = min(frame[pixel], lanes.value[i])
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _count_atomics(lanes, hits, shape, merge, row, chunks):
+    """One instruction on each plane of the frame buffer, by the rules of ``models.atomics``.
+
+    A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
+    """
+    conflicts, depth, requests = 0, 0, 0
+    for i in range(hits):
+        rank, served = 1, 0
+        for j in range(i):
+            if lanes.address[j] == lanes.address[i]:
+                rank += 1
+            if lanes.address[j] // CHUNK_BYTES == lanes.address[i] // CHUNK_BYTES:
+                served = max(served, lanes.rank[j])
+        lanes.rank[i] = rank
+        conflicts += rank > 1
+        depth = max(depth, rank)
+        if merge != SECTOR or rank > served:
+            requests += 1
+            for plane in range(shape.words):
+                chunks[(lanes.address[i] + plane * shape.plane_bytes) // CHUNK_BYTES] += 1
+    row[FreePipeEvent.ATOMIC] += shape.words
+    row[FreePipeEvent.ATOMIC_LANES] += shape.words * hits
+    row[FreePipeEvent.ATOMIC_REQUESTS] += shape.words * requests
+    row[FreePipeEvent.ATOMIC_CONFLICTS] += shape.words * conflicts
+    row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
+
+
+@njit(cache=True, nogil=True)
+def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
+    """Scan the lanes' pieces in lockstep; returns the steps taken."""
+    active, rows = _start_rows(pieces, lanes)
+    steps = 0
+    row[FreePipeEvent.SETUP_STEPS] += 1
+    row[FreePipeEvent.SETUP_LANES] += active
+    for r in range(rows):
+        active, widest = _start_row(pieces, lanes, r)
+        row[FreePipeEvent.ROW_STEPS] += 1
+        row[FreePipeEvent.ROW_LANES] += active
+        row[FreePipeEvent.WARP_STEPS] += widest
+        steps += widest
+        for c in range(widest):
+            tests, hits = _step(pieces, lanes, r, c, shape.width, shape.word_bytes, frame is not None)
+            row[FreePipeEvent.SAMPLE_TESTS] += tests
+            row[FreePipeEvent.SAMPLE_HITS] += hits
+            if frame is not None and hits > 0:
+                hits = _early(lanes, hits, t0, frame, shape.word_bytes, simt, row)
+            if hits > 0:
+                _count_atomics(lanes, hits, shape, simt.atomic_merge, row, chunks)
+    return steps
+
+
+class FrameShape(NamedTuple):
+    """The frame buffer as threads address it."""
+
+    width: int
+    word_bytes: int
+    words: int  # atomics a fragment
+    plane_bytes: int  # bytes from a fragment's one word to the next
+
+
+@njit(cache=True, nogil=True)
+def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, frame):
+    """One warp, triangles t0..t0+lanes_in-1; returns the steps of its longest way."""
+    row[FreePipeEvent.WARPS] += 1
+    row[FreePipeEvent.LANES_IN] += lanes_in
+    _count_vertices(triangles, t0, lanes_in, simt, lanes.address, row)
+    inside, clip, turns = 0, 0, 0
+    lanes.piece[:] = -1
+    for lane in range(lanes_in):
+        t = t0 + lane
+        if pieces.kind[t] == INSIDE:
+            inside += 1
+            lanes.piece[lane] = pieces.first[t]
+        elif pieces.kind[t] == CLIPPED:
+            clip += 1
+            turns = max(turns, pieces.first[t + 1] - pieces.first[t])
+    row[FreePipeEvent.CLIP_WARPS] += clip > 0
+    row[FreePipeEvent.CLIP_LANES] += clip
+    steps = 0
+    if inside > 0:
+        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+    for i in range(turns):
+        for lane in range(WARP):
+            t = t0 + lane
+            mine = lane < lanes_in and pieces.kind[t] == CLIPPED and pieces.first[t] + i < pieces.first[t + 1]
+            lanes.piece[lane] = pieces.first[t] + i if mine else -1
+        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+    return steps
+
+
+@njit(cache=True, nogil=True)
+def _blocks(triangles, pieces, block, worker, workers, shape, simt, table, chunks, frame):
+    """Every ``workers``-th block from ``worker`` on."""
+    lanes = _new_lanes()
+    for b in range(worker, table.shape[0], workers):
+        longest = 0
+        for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
+            lanes_in = min(WARP, min((b + 1) * block, triangles.shape[0]) - t0)
+            steps = _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks, frame)
+            longest = max(longest, steps)
+        table[b, FreePipeEvent.CHAIN_STEPS] = longest
