@@ -55,28 +55,31 @@ def basis(first, side, rows, slopes):
 
 @njit(cache=True, nogil=True)
 def _along_v(points, by_v, between):
-    """Contract the rows of one coordinate of a net: ``between[4 r + x]``."""
+    """Contract the rows of one coordinate of a net: ``between[4 r + x]``.
+
+    Four sums at a time and then four stores, here and below: so LLVM makes them one vector.
+    """
     for r in range(4):
-        for x in range(4):
-            between[4 * r + x] = (
-                by_v[0, r] * points[x]
-                + by_v[1, r] * points[4 + x]
-                + by_v[2, r] * points[8 + x]
-                + by_v[3, r] * points[12 + x]
-            )
+        v0, v1, v2, v3 = by_v[0, r], by_v[1, r], by_v[2, r], by_v[3, r]
+        x0 = v0 * points[0] + v1 * points[4] + v2 * points[8] + v3 * points[12]
+        x1 = v0 * points[1] + v1 * points[5] + v2 * points[9] + v3 * points[13]
+        x2 = v0 * points[2] + v1 * points[6] + v2 * points[10] + v3 * points[14]
+        x3 = v0 * points[3] + v1 * points[7] + v2 * points[11] + v3 * points[15]
+        q = 4 * r
+        between[q], between[q + 1], between[q + 2], between[q + 3] = x0, x1, x2, x3
 
 
 @njit(cache=True, nogil=True)
 def _along_u(between, by_u, out):
     """Contract the columns: ``out[4 r + c]``."""
     for r in range(4):
-        for c in range(4):
-            out[4 * r + c] = (
-                by_u[0, c] * between[4 * r]
-                + by_u[1, c] * between[4 * r + 1]
-                + by_u[2, c] * between[4 * r + 2]
-                + by_u[3, c] * between[4 * r + 3]
-            )
+        q = 4 * r
+        p0, p1, p2, p3 = between[q], between[q + 1], between[q + 2], between[q + 3]
+        c0 = by_u[0, 0] * p0 + by_u[1, 0] * p1 + by_u[2, 0] * p2 + by_u[3, 0] * p3
+        c1 = by_u[0, 1] * p0 + by_u[1, 1] * p1 + by_u[2, 1] * p2 + by_u[3, 1] * p3
+        c2 = by_u[0, 2] * p0 + by_u[1, 2] * p1 + by_u[2, 2] * p2 + by_u[3, 2] * p3
+        c3 = by_u[0, 3] * p0 + by_u[1, 3] * p1 + by_u[2, 3] * p2 + by_u[3, 3] * p3
+        out[q], out[q + 1], out[q + 2], out[q + 3] = c0, c1, c2, c3
 
 
 @njit(cache=True, nogil=True)
@@ -98,26 +101,42 @@ def restrict(points, by_u, by_v, between, out):
 
 
 @njit(cache=True, nogil=True)
-def tangents(points, by_u, by_v, slope_u, slope_v, between, along_u, along_v):
-    """Thirds of the derivatives along u and v on a grid, (>= D, 16) each, D the rows of ``points``.
+def _slopes_along_u(between, slope_u, out):
+    """Contract the differences of neighbouring columns."""
+    for r in range(4):
+        q = 4 * r
+        d0, d1, d2 = between[q + 1] - between[q], between[q + 2] - between[q + 1], between[q + 3] - between[q + 2]
+        c0 = slope_u[0, 0] * d0 + slope_u[1, 0] * d1 + slope_u[2, 0] * d2
+        c1 = slope_u[0, 1] * d0 + slope_u[1, 1] * d1 + slope_u[2, 1] * d2
+        c2 = slope_u[0, 2] * d0 + slope_u[1, 2] * d1 + slope_u[2, 2] * d2
+        c3 = slope_u[0, 3] * d0 + slope_u[1, 3] * d1 + slope_u[2, 3] * d2
+        out[q], out[q + 1], out[q + 2], out[q + 3] = c0, c1, c2, c3
+
+
+@njit(cache=True, nogil=True)
+def _slopes_along_v(points, slope_v, between):
+    """Contract the differences of neighbouring rows."""
+    for r in range(4):
+        v0, v1, v2 = slope_v[0, r], slope_v[1, r], slope_v[2, r]
+        x0 = v0 * (points[4] - points[0]) + v1 * (points[8] - points[4]) + v2 * (points[12] - points[8])
+        x1 = v0 * (points[5] - points[1]) + v1 * (points[9] - points[5]) + v2 * (points[13] - points[9])
+        x2 = v0 * (points[6] - points[2]) + v1 * (points[10] - points[6]) + v2 * (points[14] - points[10])
+        x3 = v0 * (points[7] - points[3]) + v1 * (points[11] - points[7]) + v2 * (points[15] - points[11])
+        q = 4 * r
+        between[q], between[q + 1], between[q + 2], between[q + 3] = x0, x1, x2, x3
+
+
+@njit(cache=True, nogil=True)
+def evaluate(points, by_u, by_v, slope_u, slope_v, between, out, along_u, along_v):
+    """Points of a grid, and thirds of the derivatives along u and v: a coordinate of ``points`` a row of each.
 
     Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
     """
     for d in range(points.shape[0]):
-        net = points[d]
-        _along_v(net, by_v, between)
-        for r in range(4):
-            q = 4 * r
-            d0, d1, d2 = between[q + 1] - between[q], between[q + 2] - between[q + 1], between[q + 3] - between[q + 2]
-            for c in range(4):
-                along_u[d, q + c] = slope_u[0, c] * d0 + slope_u[1, c] * d1 + slope_u[2, c] * d2
-        for r in range(4):
-            for x in range(4):
-                between[4 * r + x] = (
-                    slope_v[0, r] * (net[4 + x] - net[x])
-                    + slope_v[1, r] * (net[8 + x] - net[4 + x])
-                    + slope_v[2, r] * (net[12 + x] - net[8 + x])
-                )
+        _along_v(points[d], by_v, between)
+        _along_u(between, by_u, out[d])
+        _slopes_along_u(between, slope_u, along_u[d])
+        _slopes_along_v(points[d], slope_v, between)
         _along_u(between, by_u, along_v[d])
 
 

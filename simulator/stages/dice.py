@@ -19,9 +19,9 @@ from models.coalescing import transactions
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
-from simulator.stages.bezier import basis, restrict, screen_points, tangents
+from simulator.stages.bezier import basis, evaluate, restrict, screen_points
 from simulator.stages.bound_and_split import SubPatches
-from simulator.stages.shading import NUDGE, Grid, _set_normals, has_normal, lighting, shade
+from simulator.stages.shading import MATT, NORMAL, NUDGE, lighting, new_grid, set_normals, shade
 from simulator.work import Work
 
 BLOCK = 256  # threads, a vertex each: 16 sub-patches
@@ -57,57 +57,38 @@ _E = DiceEvent
 
 
 @njit(cache=True, nogil=True)
-def _new_grid():
-    """Scratch for one grid of a patch without weights: w = 1 everywhere."""
-    f = np.float32
-    grid = Grid(
-        np.empty((4, 4), f),
-        np.empty((4, 4), f),
-        np.empty((3, 4), f),
-        np.empty((3, 4), f),
-        np.empty(16, f),
-        np.empty((4, 16), f),
-        np.ones((4, 16), f),
-        np.zeros((4, 16), f),
-        np.zeros((4, 16), f),
-        np.empty((4, 16), f),
-        np.empty((2, 16), f),
-    )
-    return grid
-
-
-@njit(cache=True, nogil=True)
 def _set_tables(grid, first_u, first_v, side):
     basis(first_u, side, grid.by_u, grid.slope_u)
     basis(first_v, side, grid.by_v, grid.slope_v)
 
 
 @njit(cache=True, nogil=True)
-def _evaluate(grid, net, dimensions):
-    """Points, tangents and normals of a grid from the control net (D, 16) of its patch."""
-    restrict(net, grid.by_u, grid.by_v, grid.between, grid.point[:dimensions])
-    tangents(net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.along_u, grid.along_v)
-    _set_normals(grid)
+def _evaluate(grid, net):
+    """Points, tangents and normals of a grid from the control net (D, 16) of its patch; vertices without a normal."""
+    evaluate(
+        net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
+    )
+    return set_normals(grid.rows)
 
 
 @njit(cache=True, nogil=True)
-def _borrow_normal(grid, net, first_u, first_v, side, spare):
+def _borrow_normals(grid, net, first_u, first_v, side, spare):
     """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
     for k in range(VERTICES):
-        if has_normal(grid, k):
+        if grid.rows[MATT + k] > 0:
             continue
         middle = np.float32(0.5)
         u = np.float32(3 * first_u + (k & 3)) * side / np.float32(3)
         v = np.float32(3 * first_v + (k >> 2)) * side / np.float32(3)
-        # a grid of no size at the place: all its 16 vertices are that point
         _set_point_tables(spare, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE)
-        _evaluate(spare, net, net.shape[0])
-        grid.normal[:, k] = spare.normal[:, 0]
+        _evaluate(spare, net)
+        for d in range(3):
+            grid.rows[NORMAL + 16 * d + k] = spare.rows[NORMAL + 16 * d]
 
 
 @njit(cache=True, nogil=True)
 def _set_point_tables(grid, u, v):
-    """Tables of one parameter in the first column."""
+    """Tables of a grid of which only the first vertex counts, at (u, v)."""
     for table, slopes, a in ((grid.by_u, grid.slope_u, u), (grid.by_v, grid.slope_v, v)):
         A = np.float32(1) - a
         table[:] = np.float32(0)
@@ -134,20 +115,17 @@ def _store_grid(screen, vertices, box):
 @njit(cache=True, nogil=True)
 def _dice_chunk(start, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes):
     """Dice the sub-patches start..stop-1."""
-    grid = _new_grid()
-    spare = _new_grid()
-    color = np.empty(VERTICES, np.uint32)
+    grid = new_grid()
+    spare = new_grid()
     for n in range(start, stop):
         patch, i, j = subpatches.patch[n], np.int64(subpatches.i[n]), np.int64(subpatches.j[n])
         side = np.float32(1) / np.float32(1 << subpatches.level[n])
         _set_tables(grid, i, j, side)
         restrict(screen[patch], grid.by_u, grid.by_v, grid.between, grid.screen)
         _store_grid(grid.screen, vertices[n], boxes[n])
-        _evaluate(grid, nets[patch], nets.shape[1])
-        _borrow_normal(grid, nets[patch], i, j, side, spare)
-        shade(grid, light, texture, i, j, side, color)
-        for k in range(VERTICES):
-            colors[n, k, 3] = color[k]
+        if _evaluate(grid, nets[patch]):
+            _borrow_normals(grid, nets[patch], i, j, side, spare)
+        shade(grid, light, texture, i, j, side, colors[n])
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -196,7 +174,9 @@ def dice(
     TilestampError
         A texture of another shape or type, or numbers that are not finite.
     """
-    if texture is not None and (texture.ndim != 3 or texture.shape[2] not in (3, 4) or texture.dtype != np.uint8):
+    if texture is not None and not (
+        texture.ndim == 3 and texture.shape[2] in (3, 4) and texture.size and texture.dtype == np.uint8
+    ):
         raise TilestampError(f"texture must be (H, W, 3 or 4) bytes, not {texture.dtype} of shape {texture.shape}")
     dimensions = 3 if (points[..., 3] == 1).all() else 4
     nets = np.ascontiguousarray(points[..., :dimensions].transpose(0, 2, 1))

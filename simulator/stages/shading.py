@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 AMBIENT = np.float32(0.15)
 DIFFUSE = np.float32(0.75)
-SPECULAR = np.float32(0.35)
-SHININESS_LOG2 = 5  # the exponent is 32
+SPECULAR = np.float32(0.35)  # with an exponent of 32: five squarings
 LAMP = (-0.5, 0.7, 1.0)  # right, up, towards the viewer
 LIGHT_SQUARE = (np.float32(0.92), np.float32(0.86), np.float32(0.74))
 DARK_SQUARE = (np.float32(0.72), np.float32(0.47), np.float32(0.33))
@@ -33,20 +32,45 @@ class Lighting(NamedTuple):
     squares: np.float32  # checker squares in a unit of length
 
 
+# Rows of 16 vertices in one buffer: with one base and constant distances LLVM sees that they do not overlap.
+SCREEN, POINT, ALONG_U, ALONG_V, NORMAL = 0, 64, 128, 192, 256  # 4 coordinates each, but 3 of NORMAL
+MATT, GLOSS = 304, 320  # ambient and diffuse, and specular light
+COLOR = 336  # red, green, blue
+ROWS = 384
+
+
 class Grid(NamedTuple):
-    """Scratch of one grid: coordinates by 16 vertices, and the tables of its two parameters."""
+    """Scratch of one grid: tables of its parameters, and rows of its vertices with views of some."""
 
     by_u: NDArray[np.float32]  # (4, 4)
     by_v: NDArray[np.float32]
     slope_u: NDArray[np.float32]  # (3, 4)
     slope_v: NDArray[np.float32]
     between: NDArray[np.float32]  # (16,)
+    rows: NDArray[np.float32]  # (ROWS,)
     screen: NDArray[np.float32]  # (4, 16) x w, y w, w, z w
-    point: NDArray[np.float32]  # (4, 16) homogeneous model space
+    point: NDArray[np.float32]  # (4, 16) homogeneous, model space
     along_u: NDArray[np.float32]  # (4, 16)
-    along_v: NDArray[np.float32]
-    normal: NDArray[np.float32]  # (4, 16) not yet of unit length; the last row is the product of tangent lengths
-    light: NDArray[np.float32]  # (2, 16) diffuse with ambient, specular
+    along_v: NDArray[np.float32]  # (4, 16)
+
+
+@njit(cache=True, nogil=True)
+def new_grid():
+    """Scratch for grids; w = 1 until a patch with weights writes it."""
+    rows = np.zeros(ROWS, np.float32)
+    rows[POINT + 48 : POINT + 64] = 1
+    return Grid(
+        np.empty((4, 4), np.float32),
+        np.empty((4, 4), np.float32),
+        np.empty((3, 4), np.float32),
+        np.empty((3, 4), np.float32),
+        np.empty(16, np.float32),
+        rows,
+        rows[SCREEN : SCREEN + 64].reshape(4, 16),
+        rows[POINT : POINT + 64].reshape(4, 16),
+        rows[ALONG_U : ALONG_U + 64].reshape(4, 16),
+        rows[ALONG_V : ALONG_V + 64].reshape(4, 16),
+    )
 
 
 def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
@@ -77,88 +101,91 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
 
 
 @njit(cache=True, nogil=True)
-def _set_normals(grid):
-    """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor."""
-    p, u, v, n = grid.point, grid.along_u, grid.along_v, grid.normal
+def set_normals(s):
+    """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
+    missing = 0
     for k in range(16):
-        w, wu, wv = p[3, k], u[3, k], v[3, k]
-        ux, uy, uz = u[0, k] * w - p[0, k] * wu, u[1, k] * w - p[1, k] * wu, u[2, k] * w - p[2, k] * wu
-        vx, vy, vz = v[0, k] * w - p[0, k] * wv, v[1, k] * w - p[1, k] * wv, v[2, k] * w - p[2, k] * wv
-        n[0, k] = uy * vz - uz * vy
-        n[1, k] = uz * vx - ux * vz
-        n[2, k] = ux * vy - uy * vx
-        n[3, k] = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
+        px, py, pz, w = s[POINT + k], s[POINT + 16 + k], s[POINT + 32 + k], s[POINT + 48 + k]
+        wu, wv = s[ALONG_U + 48 + k], s[ALONG_V + 48 + k]
+        ux, uy, uz = s[ALONG_U + k] * w - px * wu, s[ALONG_U + 16 + k] * w - py * wu, s[ALONG_U + 32 + k] * w - pz * wu
+        vx, vy, vz = s[ALONG_V + k] * w - px * wv, s[ALONG_V + 16 + k] * w - py * wv, s[ALONG_V + 32 + k] * w - pz * wv
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        most = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
+        none = nx * nx + ny * ny + nz * nz <= DEGENERATE * most
+        missing += none
+        s[NORMAL + k], s[NORMAL + 16 + k], s[NORMAL + 32 + k] = nx, ny, nz
+        s[MATT + k] = _ZERO if none else _ONE  # until the light is set: whether there is a normal
+    return missing
 
 
 @njit(cache=True, nogil=True)
-def has_normal(grid, k):
-    """Whether the tangents of vertex k span a plane."""
-    n = grid.normal
-    return n[0, k] * n[0, k] + n[1, k] * n[1, k] + n[2, k] * n[2, k] > DEGENERATE * n[3, k]
-
-
-@njit(cache=True, nogil=True)
-def _set_light(grid, lamp, eye):
-    """Ambient and diffuse, and specular light by vertex; a normal turned away from the viewer is turned round."""
-    p, n, light = grid.point, grid.normal, grid.light
-    lx, ly, lz = lamp[0], lamp[1], lamp[2]
-    ex, ey, ez, ew = eye[0], eye[1], eye[2], eye[3]
+def _set_light(s, lx, ly, lz, ex, ey, ez, ew):
+    """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
     for k in range(16):
-        w = p[3, k]
-        vx, vy, vz = ex * w - ew * p[0, k], ey * w - ew * p[1, k], ez * w - ew * p[2, k]
-        nx, ny, nz = n[0, k], n[1, k], n[2, k]
-        v_length = np.sqrt(vx * vx + vy * vy + vz * vz + tiny)
-        n_length = np.sqrt(nx * nx + ny * ny + nz * nz + tiny)
-        facing = (nx * vx + ny * vy + nz * vz) / (v_length * n_length)
-        lit = (nx * lx + ny * ly + nz * lz) / n_length
+        w = s[POINT + 48 + k]
+        vx, vy, vz = ex * w - ew * s[POINT + k], ey * w - ew * s[POINT + 16 + k], ez * w - ew * s[POINT + 32 + k]
+        nx, ny, nz = s[NORMAL + k], s[NORMAL + 16 + k], s[NORMAL + 32 + k]
+        v_scale = _ONE / np.sqrt(vx * vx + vy * vy + vz * vz + tiny)
+        n_scale = _ONE / np.sqrt(nx * nx + ny * ny + nz * nz + tiny)
+        facing = (nx * vx + ny * vy + nz * vz) * (v_scale * n_scale)
+        lit = (nx * lx + ny * ly + nz * lz) * n_scale
         lit = lit if facing >= _ZERO else -lit
-        along = (lx * vx + ly * vy + lz * vz) / v_length
-        mirrored = max(_TWO * lit * abs(facing) - along, _ZERO)  # reflected lamp . viewer
-        mirrored = mirrored if lit > _ZERO else _ZERO
-        for _ in range(SHININESS_LOG2):
-            mirrored *= mirrored
-        light[0, k] = AMBIENT + DIFFUSE * max(lit, _ZERO)
-        light[1, k] = SPECULAR * mirrored
+        along = (lx * vx + ly * vy + lz * vz) * v_scale
+        mirrored = _TWO * lit * abs(facing) - along  # reflected lamp . viewer
+        mirrored = mirrored if mirrored > _ZERO and lit > _ZERO else _ZERO
+        mirrored *= mirrored
+        mirrored *= mirrored
+        mirrored *= mirrored
+        mirrored *= mirrored
+        mirrored *= mirrored
+        s[MATT + k] = AMBIENT + DIFFUSE * (lit if lit > _ZERO else _ZERO)
+        s[GLOSS + k] = SPECULAR * mirrored
 
 
 @njit(cache=True, nogil=True)
-def _checker(grid, k, squares):
-    """Colour of a solid checker at vertex k."""
-    scale = squares / grid.point[3, k]
-    cells = np.floor(grid.point[0, k] * scale) + np.floor(grid.point[1, k] * scale) + np.floor(grid.point[2, k] * scale)
-    return LIGHT_SQUARE if np.int64(cells) & 1 else DARK_SQUARE
-
-
-@njit(cache=True, nogil=True)
-def _texel(texture, u, v):
-    """Colour of the texel at (u, v) of the patch, v down the rows."""
-    row = min(np.int64(v * np.float32(texture.shape[0])), texture.shape[0] - 1)
-    column = min(np.int64(u * np.float32(texture.shape[1])), texture.shape[1] - 1)
-    texel = texture[row, column]
-    return np.float32(texel[0]) / _BYTE, np.float32(texel[1]) / _BYTE, np.float32(texel[2]) / _BYTE
-
-
-@njit(cache=True, nogil=True)
-def _byte(x):
-    return np.uint32(min(x, _ONE) * _BYTE + _HALF)
-
-
-@njit(cache=True, nogil=True)
-def shade(grid, light, texture, first_u, first_v, side, colors):
-    """Colours (16,) uint32, RGBA8 with red lowest, of a grid whose ``normal`` is set."""
-    _set_light(grid, light.lamp, light.eye)
+def _set_checker(s, squares):
+    """Reflectances of a solid checker."""
     for k in range(16):
-        if texture is None:
-            red, green, blue = _checker(grid, k, light.squares)
-        else:
-            u = np.float32(3 * first_u + (k & 3)) * side / _THREE
-            v = np.float32(3 * first_v + (k >> 2)) * side / _THREE
-            red, green, blue = _texel(texture, u, v)
-        matt, gloss = grid.light[0, k], grid.light[1, k]
-        colors[k] = (
-            _byte(red * matt + gloss)
-            | _byte(green * matt + gloss) << np.uint32(8)
-            | _byte(blue * matt + gloss) << np.uint32(16)
-            | OPAQUE
-        )
+        scale = squares / s[POINT + 48 + k]
+        cells = np.floor(s[POINT + k] * scale) + np.floor(s[POINT + 16 + k] * scale)
+        half = _HALF * (cells + np.floor(s[POINT + 32 + k] * scale))
+        odd = half != np.floor(half)
+        s[COLOR + k] = LIGHT_SQUARE[0] if odd else DARK_SQUARE[0]
+        s[COLOR + 16 + k] = LIGHT_SQUARE[1] if odd else DARK_SQUARE[1]
+        s[COLOR + 32 + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
+
+
+@njit(cache=True, nogil=True)
+def _set_texels(s, texture, first_u, first_v, side):
+    """Reflectances from the texels at (u, v) of the patch, v down the rows."""
+    for k in range(16):
+        u = np.float32(3 * first_u + (k & 3)) * side / _THREE
+        v = np.float32(3 * first_v + (k >> 2)) * side / _THREE
+        row = min(np.int64(v * np.float32(texture.shape[0])), texture.shape[0] - 1)
+        column = min(np.int64(u * np.float32(texture.shape[1])), texture.shape[1] - 1)
+        for channel in range(3):
+            s[COLOR + 16 * channel + k] = np.float32(texture[row, column, channel]) / _BYTE
+
+
+@njit(cache=True, nogil=True)
+def _set_colors(s):
+    """Light the reflectances: levels from 0 to 255."""
+    for k in range(48):
+        level = s[COLOR + k] * s[MATT + (k & 15)] + s[GLOSS + (k & 15)]
+        s[COLOR + k] = (level if level < _ONE else _ONE) * _BYTE + _HALF
+
+
+@njit(cache=True, nogil=True)
+def shade(grid, light, texture, first_u, first_v, side, vertices):
+    """Write the colours of a grid with normals, RGBA8 with red lowest, to the fourth word of ``vertices`` (16, 4)."""
+    s, lamp, eye = grid.rows, light.lamp, light.eye
+    _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])
+    if texture is None:
+        _set_checker(s, light.squares)
+    else:
+        _set_texels(s, texture, first_u, first_v, side)
+    _set_colors(s)
+    for k in range(16):
+        red, green, blue = np.uint32(s[COLOR + k]), np.uint32(s[COLOR + 16 + k]), np.uint32(s[COLOR + 32 + k])
+        vertices[k, 3] = red | green << np.uint32(8) | blue << np.uint32(16) | OPAQUE
