@@ -59,7 +59,6 @@ class BucketCountEvent(IntEnum):
     STORE_BYTES = 16
 
 
-
 _E = BucketCountEvent
 
 

@@ -41,7 +41,9 @@ class BucketScanEvent(IntEnum):
 _E = BucketScanEvent
 
 
-def bucket_scan(count: NDArray[np.uint32], simt: Simt, *, counting: bool = True) -> tuple[NDArray[np.uint32], list[Work]]:
+def bucket_scan(
+    count: NDArray[np.uint32], simt: Simt, *, counting: bool = True
+) -> tuple[NDArray[np.uint32], list[Work]]:
     """Prefix sum of COUNT.
 
     Parameters

@@ -45,38 +45,37 @@ _Z_WARPS = int(_E.Z_WARPS)
 
 
 @njit(cache=True, nogil=True)
-def _raster_quad(vertices, colors, grid, v, origin, shape, samples, row):
-    """One quad in one tile: the sub-tiles that its box touches, and in each the samples inside the box."""
-    tile, side = shape.tile, shape.side
-    x0, y0, x1, y1 = quad_box(vertices, grid, v)
-    if x1 < origin[0] or x0 > origin[0] + tile or y1 < origin[1] or y0 > origin[1] + tile:
-        return
-    left, right = sample_span(x0, x1, origin[0], side, tile * side)
-    top, bottom = sample_span(y0, y1, origin[1], side, tile * side)
-    size = tile / side
-    for j in range(side):
-        low = origin[1] + j * size
-        if y1 < low or y0 > low + size:
+def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
+    """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
+    tile, side, size = shape.tile, shape.side, shape.subtile
+    left, top = origin
+    for quad in range(QUADS):
+        v = quad + quad // 3
+        x0, y0, x1, y1 = quad_box(vertices, grid, v)
+        if x1 < left or x0 > left + tile or y1 < top or y0 > top + tile:
             continue
-        for i in range(side):
-            low = origin[0] + i * size
-            if x1 < low or x0 > low + size:
+        i0, i1 = sample_span(x0, x1, left, side, tile * side)
+        j0, j1 = sample_span(y0, y1, top, side, tile * side)
+        for sub in range(side * side):
+            i, j = sub & (side - 1), sub >> shape.side_bits
+            if x1 < left + i * size or x0 > left + (i + 1) * size or y1 < top + j * size or y0 > top + (j + 1) * size:
                 continue
-            span = (max(left, i * tile), min(right, i * tile + tile - 1), max(top, j * tile), min(bottom, j * tile + tile - 1))
-            inside = span[0] <= span[1] and span[2] <= span[3]
+            span = (max(i0, i * tile), min(i1, i * tile + tile - 1), max(j0, j * tile), min(j1, j * tile + tile - 1))
+            columns, rows = span[1] - span[0] + 1, span[3] - span[2] + 1
+            inside = columns > 0 and rows > 0
             if row is not None and shape.box_tests:
                 row[_E.SUBTILE_PASS] += 1
                 if inside:
                     row[_E.BOX_WARPS] += box_warps(span, shape)
-                    row[_E.BOX_LANES] += (span[1] - span[0] + 1) * (span[3] - span[2] + 1)
+                    row[_E.BOX_LANES] += columns * rows
             if inside:
-                sample_quad(
-                    vertices, colors, grid, v, span, origin, side, samples, tile, shape.warp, row, _HIT_WARPS, _Z_WARPS
-                )
+                sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, _HIT_WARPS, _Z_WARPS)
 
 
 @njit(cache=True, nogil=True)
-def _raster_rows(part, parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table):
+def _raster_rows(
+    part, parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
+):
     """Every ``parts``-th row of tiles."""
     size = shape.tile * shape.side
     samples = Samples(
@@ -94,8 +93,7 @@ def _raster_rows(part, parts, vertices, colors, count, start, lists, tiles, shap
             samples.color[:] = BACKGROUND
             samples.hits[:] = 0
             for k in range(first, first + grids):
-                for quad in range(QUADS):
-                    _raster_quad(vertices, colors, lists[k], quad + quad // 3, origin, shape, samples, row)
+                _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
             resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
             if row is not None:
                 count_block(block, lists, first, grids, shape, traffic, row)
@@ -168,8 +166,8 @@ def tile_raster(
         raise TilestampError(f"spp must be 1, 4 or 16 samples a pixel, not {spp}")
     if edges not in ("computed", "loaded"):
         raise TilestampError(f"edges must be computed or loaded, not {edges}")
-    if simt.warp < SMALLEST_WARP:
-        raise TilestampError(f"tile_raster needs warps of at least {SMALLEST_WARP} lanes, not {simt.warp}")
+    if simt.warp < SMALLEST_WARP or simt.warp.bit_count() > 1:
+        raise TilestampError(f"tile_raster needs warps of 16, 32 or 64 lanes, not {simt.warp}")
     shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
     image = np.empty((height, width, 3), np.uint8)
     depth = np.empty((height, width), np.float32)

@@ -77,7 +77,10 @@ class BlockShape(NamedTuple):
 
     tile: int  # pixels a side
     side: int  # sub-tiles a side: samples a pixel are side**2
+    side_bits: int  # log2 of it
+    subtile: float  # pixels a side of a sub-tile
     warp: int
+    warp_bits: int  # log2 of the lanes: kernels shift, a division would be most of their work
     warps: int
     coalescing: int
     box_tests: bool
@@ -97,7 +100,11 @@ class BlockTraffic(NamedTuple):
 def block_shape(tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool) -> BlockShape:
     """Shape of a block of ``tile**2`` threads."""
     side = {1: 1, 4: 2, 16: 4}[spp]
-    return BlockShape(tile, side, simt.warp, -(-tile * tile // simt.warp), int(simt.coalescing), box_tests, loaded)
+    bits = simt.warp.bit_length() - 1
+    warps = -(-tile * tile // simt.warp)
+    return BlockShape(
+        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests, loaded
+    )
 
 
 def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
@@ -124,12 +131,11 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
 @njit(cache=True, nogil=True)
 def box_warps(span, shape):
     """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
-    tile, warp = shape.tile, shape.warp
-    first_column, last_column = span[0] % tile, span[1] % tile
-    first_row, last_row = span[2] % tile, span[3] % tile
-    if warp >= tile:  # a warp holds whole rows
-        return last_row * tile // warp - first_row * tile // warp + 1
-    return (last_row - first_row + 1) * (last_column // warp - first_column // warp + 1)
+    mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
+    first_row, last_row = span[2] & mask, span[3] & mask
+    if shape.warp >= shape.tile:  # a warp holds whole rows
+        return (last_row * shape.tile >> bits) - (first_row * shape.tile >> bits) + 1
+    return (last_row - first_row + 1) * (((span[1] & mask) >> bits) - ((span[0] & mask) >> bits) + 1)
 
 
 @njit(cache=True, nogil=True)

@@ -66,15 +66,21 @@ def sample_span(low, high, origin, side, samples):
 
 
 @njit(cache=True, nogil=True)
-def sample_quad(vertices, colors, grid, v, span, origin, side, samples, tile, warp, row, hit, passed):
+def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hit, passed):
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 
     ``row[hit]``, ``row[hit + 1]`` count warps and lanes that cover a sample, ``row[passed]``, ``row[passed + 1]``
     those that pass the z-test.
     """
     ax, ay, bx, by = vertices[grid, v, 0], vertices[grid, v, 1], vertices[grid, v + 1, 0], vertices[grid, v + 1, 1]
-    cx, cy, dx, dy = vertices[grid, v + 5, 0], vertices[grid, v + 5, 1], vertices[grid, v + 4, 0], vertices[grid, v + 4, 1]
-    step = _ONE / np.float32(side)
+    cx, cy, dx, dy = (
+        vertices[grid, v + 5, 0],
+        vertices[grid, v + 5, 1],
+        vertices[grid, v + 4, 0],
+        vertices[grid, v + 4, 1],
+    )
+    step = _ONE / np.float32(shape.side)
+    mask = shape.tile - 1
     hit_warp = passed_warp = -1  # the last warp that was counted: lanes come in order
     for j in range(span[2], span[3] + 1):
         y = np.float32(origin[1]) + (np.float32(j) + _HALF) * step
@@ -91,7 +97,7 @@ def sample_quad(vertices, colors, grid, v, span, origin, side, samples, tile, wa
                 continue
             if row is not None:
                 samples.hits[j, i] += 1
-                of_warp = ((j % tile) * tile + i % tile) // warp
+                of_warp = ((j & mask) * shape.tile + (i & mask)) >> shape.warp_bits
                 row[hit] += of_warp != hit_warp
                 row[hit + 1] += 1
                 hit_warp = of_warp
@@ -111,7 +117,7 @@ def sample_quad(vertices, colors, grid, v, span, origin, side, samples, tile, wa
                     colors[grid, v], colors[grid, p], colors[grid, v + 5], wa * r, wb * r, wc * r
                 )
                 if row is not None:
-                    of_warp = ((j % tile) * tile + i % tile) // warp
+                    of_warp = ((j & mask) * shape.tile + (i & mask)) >> shape.warp_bits
                     row[passed] += of_warp != passed_warp
                     row[passed + 1] += 1
                     passed_warp = of_warp

@@ -1,0 +1,142 @@
+"""Data-parallel micropolygon rasterization (Eisenacher & Loop 2010): the overview of section 3, stage by stage.
+
+Bound and split patches until they are small on screen; dice them into 4x4 grids; sort the grids into the buckets of
+screen tiles by count, scan and write; rasterize each tile. In the hybrid the grids go to the fixed-function rasterizer
+instead of the buckets.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.errors import TilestampError
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.scenes.scene import Scene
+from simulator.stages.bound_and_split import BoundRule, SubPatches, bound_and_split
+from simulator.stages.bucket_count import bucket_count
+from simulator.stages.bucket_scan import bucket_scan
+from simulator.stages.bucket_write import bucket_write
+from simulator.stages.dice import dice
+from simulator.stages.tile_range import Tiles, screen_tiles
+from simulator.stages.tile_raster import tile_raster
+from simulator.stages.tile_raster_events import TileRasterEvent
+from simulator.work import Work
+
+
+def micropolygon(
+    scene: Scene,
+    matrix: ArrayLike,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    tile: int = 8,
+    spp: int = 1,
+    bound: float = 4,
+    bound_rule: BoundRule = "control_points",
+    box_tests: bool = True,
+    edges: Literal["computed", "loaded"] = "computed",
+    hybrid: bool = False,
+    texture: NDArray[np.uint8] | None = None,
+    counting: bool = True,
+) -> Frame:
+    """Draw the patches of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        With patches.
+    matrix : array-like, (4, 4)
+        Model to clip space, for column vectors.
+    width, height : int
+        Pixels.
+    simt : Simt
+    tile : int
+        Pixels a side of a screen tile: 4, 8, 16 or 32.
+    spp : int
+        Samples a pixel: 1, 4 or 16.
+    bound : float
+        Pixels that a sub-patch may be wide and high on screen.
+    bound_rule : {"control_points", "pixel_extent"}
+        How that is measured; see ``bound_and_split``.
+    box_tests : bool
+        Test boxes before edge functions.
+    edges : {"computed", "loaded"}
+        Edge equations computed by each thread, or computed while dicing and loaded.
+    hybrid : bool
+        Give the diced grids to the fixed-function rasterizer.
+    texture : ndarray, (H, W, 3 or 4), uint8, optional
+        Laid over each patch.
+    counting : bool
+        Count what the machine does.
+
+    Returns
+    -------
+    Frame
+        Maps a tile: quads, tests, ste, atomics; a pixel: overdraw.
+
+    Raises
+    ------
+    TilestampError
+        A scene without patches, or options that a stage does not have.
+    """
+    if scene.patches is None:
+        raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
+    if hybrid:
+        raise TilestampError("the hybrid needs the hardware stage, which is not connected yet")
+    points = scene.patches.points
+    tiles = screen_tiles(width, height, tile, bound)
+    subpatches, split = bound_and_split(
+        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting
+    )
+    grids, diced = dice(points, subpatches, matrix, width, height, simt, texture=texture, counting=counting)
+    count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
+    start, scanned = bucket_scan(count, simt, counting=counting)
+    lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
+    image, depth, overdraw, drawn = tile_raster(
+        grids.vertices,
+        count,
+        start,
+        lists,
+        tiles,
+        width,
+        height,
+        simt,
+        spp=spp,
+        box_tests=box_tests,
+        edges=edges,
+        counting=counting,
+    )
+    works = [*split, *diced, *counted, *scanned, *written, *drawn]
+    maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
+    return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, lists))
+
+
+def _maps(
+    raster: Work, count: NDArray[np.uint32], overdraw: NDArray[np.int32], tiles: Tiles
+) -> dict[str, NDArray[Any]]:
+    """Heat maps: a cell a tile, and overdraw a cell a pixel."""
+    shape = (tiles.rows, tiles.columns)
+    tests = raster.table[:, TileRasterEvent.SAMPLE_TESTS].reshape(shape)
+    hits = raster.table[:, TileRasterEvent.SAMPLE_HITS].reshape(shape)
+    quads = raster.table[:, TileRasterEvent.SUBTILE_PASS].reshape(shape)
+    atomics = count.astype(np.int64).reshape(shape)
+    return {
+        "quads": quads,
+        "tests": tests,
+        "ste": hits / np.maximum(tests, 1),
+        "overdraw": overdraw,
+        "atomics": atomics,
+    }
+
+
+def _facts(subpatches: SubPatches, lists: NDArray[np.uint32]) -> dict[str, Any]:
+    """What a report may say besides."""
+    return {
+        "subpatches": len(subpatches.patch),
+        "patches_written": len(lists),
+        "queue_passes": subpatches.passes.tolist(),
+        "given_up": int(subpatches.passes[:, -1].sum()),
+    }
