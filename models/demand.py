@@ -8,7 +8,9 @@ shared      the shared memory of its SM: passes x cycles, replays included
 l1          the load/store path of its SM: bytes of its transactions
 dram, l2    the chip's bandwidths: its share of the launch's bytes
 atomic      the chip's atomic units together: requests, and lanes that conflict
-queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there
+queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there. Where atomics
+            lock DRAM, a request that waits for its lock holds up those behind it, so that the queue adds to
+            ``atomic``; L2 units wait side by side with the rest
 
 and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, or its own instructions when
 its warps are too few for all schedulers.
@@ -74,6 +76,7 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     bytes_moved = events[:, E.LOAD_BYTES] + events[:, E.STORE_BYTES]
     share = _shares(bytes_moved)
     chain = _chain(launch, machine, moved)
+    queue = _shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine)
     l2_cycles = moved.l2_bytes / memory.l2_bytes_per_clock if memory.l2_bytes else 0.0
     warps = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
     spread = machine.sm.schedulers / min(machine.sm.schedulers, warps)
@@ -83,8 +86,8 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
         l1=bytes_moved / memory.l1_bytes_per_clock,
         dram=share * (moved.dram_bytes / machine.dram_bytes_per_cycle),
         l2=share * l2_cycles,
-        atomic=_atomic(events, machine),
-        queue=_shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine),
+        atomic=_atomic(events, machine) + (queue if machine.atomics.place == "dram_lock" else 0.0),
+        queue=queue,
         chain=chain,
         alone=np.maximum(chain, issue * spread),
     )

@@ -83,6 +83,14 @@ def test_conflicting_lanes_cost_time_at_the_locks_of_gt200():
     assert crowded - free == pytest.approx(500 * GTX280.atomics.conflict_ns * 1.296)
 
 
+def test_requests_behind_a_locked_word_wait_too_on_gt200():
+    requests = np.array([5000, 0, 0])
+    locked = terms(units=1, ATOMIC_REQUESTS=5000, requests=requests)
+    free = terms(units=1, ATOMIC_REQUESTS=5000)
+    assert locked["queue"] == pytest.approx(5000 * GTX280.atomics.unit_ns_per_request * 1.296)
+    assert locked["atomic"] == pytest.approx(free["atomic"] + locked["queue"])
+
+
 def test_requests_at_one_word_queue_at_one_unit_on_hopper():
     requests = np.array([135_000, 0, 0, 0])
     cycles = terms(H200, ATOMIC_REQUESTS=45, requests=requests)["queue"]
