@@ -51,3 +51,115 @@ def catmull_clark(points, faces, creases=None):
                 [moved[v], edge_points[frozenset((v, after))], face_points[f], edge_points[frozenset((before, v))]]
             )
     return [[tuple(map(float, p)) for p in quad] for quad in quads]
+
+
+def snapped(polygon):
+    return [(math.floor(float(x) * SUB + 0.5), math.floor(float(y) * SUB + 0.5), float(z)) for x, y, z in polygon]
+
+
+def triangle_at(a, b, c, x, y):
+    """Depth of a triangle at a sample, None where it does not cover it: top-left rule, whole numbers."""
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    if area == 0:
+        return None
+    values = []
+    for p, q in ((a, b), (b, c), (c, a)):
+        sign = 1 if area > 0 else -1
+        right, down = sign * (p[1] - q[1]), sign * (q[0] - p[0])
+        value = right * (x - p[0]) + down * (y - p[1])
+        owned = right > 0 or (right == 0 and down > 0)
+        if value < 0 or (value == 0 and not owned):
+            return None
+        values.append(value)
+    ab, bc, ca = map(float, values)
+    return (bc * a[2] + ca * b[2] + ab * c[2]) / (bc + ca + ab)
+
+
+def cover(polygon, x, y):
+    """Depth of a polygon of 3 or 4 corners at a sample in sub-pixel steps, or None."""
+    corners = snapped(polygon)
+    for k in range(1, len(corners) - 1):
+        depth = triangle_at(corners[0], corners[k], corners[k + 1], x, y)
+        if depth is not None:
+            return depth
+    return None
+
+
+def render(polygons, width, height, offsets):
+    """Nearest polygon of each sample, [y][x][s], -1 where none; and how many samples each polygon covers."""
+    import numpy as np
+
+    ids = [[[-1] * len(offsets) for _ in range(width)] for _ in range(height)]
+    best = {}
+    hits = [0] * len(polygons)
+    for p, polygon in enumerate(polygons):
+        for y in range(height):
+            for x in range(width):
+                for s, (dx, dy) in enumerate(offsets):
+                    depth = cover(polygon, x * SUB + int(dx), y * SUB + int(dy))
+                    if depth is None:
+                        continue
+                    hits[p] += 1
+                    depth = np.float32(depth)
+                    if depth < best.get((x, y, s), math.inf):
+                        best[x, y, s] = depth
+                        ids[y][x][s] = p
+    return ids, hits
+
+
+def box_stamps(polygon, width, height, wide, high):
+    """Stamps (column, row) that touch a polygon's box on screen."""
+    xs, ys = [c[0] for c in snapped(polygon)], [c[1] for c in snapped(polygon)]
+    x0, x1 = max(min(xs), 0), min(max(xs), width * SUB - 1)
+    y0, y1 = max(min(ys), 0), min(max(ys), height * SUB - 1)
+    if x1 < x0 or y1 < y0:
+        return []
+    columns = range(x0 // (wide * SUB), x1 // (wide * SUB) + 1)
+    return [(i, j) for j in range(y0 // (high * SUB), y1 // (high * SUB) + 1) for i in columns]
+
+
+def clipped(polygon, x0, y0, x1, y1):
+    """Part of a convex polygon inside a rectangle, by exact clipping."""
+    points = [(Fraction(p[0]), Fraction(p[1])) for p in polygon]
+    for axis, bound, keep in ((0, x0, 1), (0, x1, -1), (1, y0, 1), (1, y1, -1)):
+        out = []
+        for p, q in zip(points, points[1:] + points[:1], strict=True):
+            a, b = keep * (p[axis] - bound), keep * (q[axis] - bound)
+            if a >= 0:
+                out.append(p)
+            if a * b < 0:
+                t = a / (a - b)
+                out.append((p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])))
+        points = out
+        if not points:
+            return []
+    return points
+
+
+def reaches(polygon, i, j, wide, high):
+    """Whether a polygon reaches into a stamp: a triangle of it has points there."""
+    corners = snapped(polygon)
+    square = (i * wide * SUB, j * high * SUB, (i + 1) * wide * SUB - 1, (j + 1) * high * SUB - 1)
+    for k in range(1, len(corners) - 1):
+        a, b, c = corners[0], corners[k], corners[k + 1]
+        if (b[0] - a[0]) * (c[1] - a[1]) != (b[1] - a[1]) * (c[0] - a[0]) and clipped([a, b, c], *square):
+            return True
+    return False
+
+
+def mask_tests(polygons, patches, width, height, offsets):
+    """Count tests and new hits of the plain bit mask in sequence."""
+    tests = hits = 0
+    mask = set()
+    for p, polygon in enumerate(polygons):
+        if p and patches[p] != patches[p - 1]:
+            mask = set()
+        for i, j in box_stamps(polygon, width, height, 1, 1):
+            for s, (dx, dy) in enumerate(offsets):
+                if (i, j, s) in mask:
+                    continue
+                tests += 1
+                if cover(polygon, i * SUB + int(dx), j * SUB + int(dy)) is not None:
+                    hits += 1
+                    mask.add((i, j, s))
+    return tests, hits

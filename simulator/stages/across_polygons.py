@@ -1,4 +1,4 @@
-"""Parallelism across polygons: one lane a micropolygon, each walking the samples of its own box (Fatahalian et al. 2009).
+"""Parallelism across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009).
 
 A warp draws 256 polygons from a queue. Its lanes take one each and step through their boxes together, so that the warp
 runs as long as its longest lane: the share of tests that hit (STE) and the share of lanes at work (SIMD efficiency) are
@@ -139,7 +139,7 @@ def _across_polygons(vertices, samples, sort, idle_to_refill, simt, table):
 
 @njit(cache=True, nogil=True)
 def _box_sizes(vertices, first, last, samples, lanes, sizes):
-    """Samples in the box of each polygon: the keys of the sort."""
+    """Count the samples in the box of each polygon: the keys of the sort."""
     for p in range(first, last):
         set_up(vertices[p], lanes[0][0], lanes[1][0], lanes[2][0], lanes[3])
         x0, y0, x1, y1 = pixel_box(lanes[1][0], samples.width, samples.height)

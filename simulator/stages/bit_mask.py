@@ -160,7 +160,7 @@ def _take(vertices, first, last, kind, samples, lanes, row):
 @njit(cache=True, nogil=True)
 def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
     """Every lane finds its next clear sample and tests it; returns whether any lane had one."""
-    edges, boxes, depths, _, walk, polygon = lanes
+    edges, _, depths, _, walk, polygon = lanes
     spp = len(samples.offsets)
     addresses = np.empty(simt.warp, np.int64)
     words = np.empty(simt.warp, np.int64)
@@ -169,7 +169,7 @@ def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
     for lane in range(len(polygon)):
         if polygon[lane] < 0:
             continue
-        read, looked = next_word(box, spp, mask, nearest, walk[lane], depths[lane])
+        read, looked = next_word(box, spp, mask, nearest, len(polygon) == 1, walk[lane], depths[lane])
         row[BitMaskEvent.MASK_READS] += read
         row[BitMaskEvent.DEPTH_READS] += looked
         reads = max(reads, read)

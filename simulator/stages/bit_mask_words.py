@@ -24,7 +24,7 @@ def patch_box(vertices, first, last, boxes, snapped, samples):
 
 @njit(cache=True, nogil=True)
 def new_mask(box, spp, layers, with_depth):
-    """A clear mask (layers, rows, words), and the patch's nearest depths (rows, samples) where they are kept."""
+    """Make a clear mask (layers, rows, words), and the patch's nearest depths (rows, samples) where they are kept."""
     rows = box[3] - box[1] + 1
     words = -(-(box[2] - box[0] + 1) * spp // WORD)
     kept = rows if with_depth else 0
@@ -32,8 +32,10 @@ def new_mask(box, spp, layers, with_depth):
 
 
 @njit(cache=True, nogil=True)
-def next_word(box, spp, mask, nearest, walk, depths):
+def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
     """Read words until one has a sample to test, or the lane's box ends; returns words read, depths looked up.
+
+    In sequence, what the patch has at equal depth is an earlier polygon, and wins; in flight together it may be a later.
 
     A lane's walk is x0, y0, x1, y1 in pixels, row, word, pending bits, mask layer; word is -1 at the start of a row.
     """
@@ -56,13 +58,13 @@ def next_word(box, spp, mask, nearest, walk, depths):
             for bit in range(WORD):
                 if (found >> bit) & 1:
                     looked += 1
-                    if nearest[walk[4] - box[1], WORD * walk[5] + bit] > _front(depths):
+                    before, front = nearest[walk[4] - box[1], WORD * walk[5] + bit], _front(depths)
+                    if before > front or (before == front and not in_sequence):
                         walk[6] |= 1 << bit
     return reads, looked
 
 
 @njit(cache=True, nogil=True)
 def _front(depths):
-    """Nearest vertex of a polygon, a little in front for the rounding of depths; of a triangle row 1 repeats row 0."""
-    front = min(min(depths[0, 0], depths[0, 1]), min(depths[0, 2], depths[1, 2]))
-    return np.float32(front) - np.abs(np.float32(front)) * np.float32(1e-6)
+    """Nearest vertex of a polygon: no depth in it is less, not even by rounding; a triangle repeats vertex 0 in row 1."""
+    return np.float32(min(depths[0, 0], depths[0, 1], depths[0, 2], depths[1, 2]))

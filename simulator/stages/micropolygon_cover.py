@@ -80,8 +80,8 @@ def _triangle(snapped, j, k, t, edges, boxes):
         snapped[0, 0], snapped[0, 1], snapped[j, 0], snapped[j, 1], snapped[k, 0], snapped[k, 1],
     )  # fmt: skip
     box = 1 + t
-    boxes[box, 0], boxes[box, 1] = min(xi, min(xj, xk)), min(yi, min(yj, yk))
-    boxes[box, 2], boxes[box, 3] = max(xi, max(xj, xk)), max(yi, max(yj, yk))
+    boxes[box, 0], boxes[box, 1] = min(xi, xj, xk), min(yi, yj, yk)
+    boxes[box, 2], boxes[box, 3] = max(xi, xj, xk), max(yi, yj, yk)
     area = (xj - xi) * (yk - yi) - (yj - yi) * (xk - xi)
     sign = 1 if area > 0 else -1 if area < 0 else 0
     _edge(xi, yi, xj, yj, sign, edges, 3 * t)
@@ -127,7 +127,7 @@ def depth_at(edges, depths, triangle, x, y):
 
 @njit(cache=True, nogil=True)
 def _value(edges, row, x, y):
-    """An edge function without the top-left rule."""
+    """Evaluate an edge function without the top-left rule."""
     return edges[row, 0] * x + edges[row, 1] * y + edges[row, 2] + edges[row, 3]
 
 

@@ -86,7 +86,7 @@ def count_hits(row, first, samples, addresses, hits, merge):
 
 @njit(cache=True, nogil=True)
 def on_screen(boxes, width, height):
-    """Part of a polygon's box that is on screen, x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if there is none."""
+    """Clip a polygon's box to the screen: x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if nothing is left."""
     return (
         max(boxes[0, 0], 0),
         max(boxes[0, 1], 0),
@@ -118,5 +118,5 @@ def visible(samples: Samples, values: NDArray[np.int32] | None = None) -> NDArra
 
 
 def blocks(simt: Simt, warps: int) -> int:
-    """Persistent blocks of ``warps`` warps: 32 warps on every SM."""
+    """Count the persistent blocks of ``warps`` warps: 32 warps on every SM."""
     return simt.sms * max(1, 32 // warps)

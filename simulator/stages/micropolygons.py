@@ -1,4 +1,4 @@
-"""Micropolygons on screen: made from patches, cages and triangle meshes (Fatahalian et al. 2009: about a pixel each)."""
+"""Micropolygons on screen: made from patches, cages and meshes (Fatahalian et al. 2009: about a pixel each)."""
 
 from typing import NamedTuple
 
@@ -40,7 +40,7 @@ class Micropolygons(NamedTuple):
 def micropolygons(
     scene: Scene, matrix: ArrayLike, width: int, height: int, size: float = 1.0, triangles: bool = False
 ) -> Micropolygons:
-    """Make the micropolygons of a scene: its patches diced to ``size`` pixels an edge, else its triangles as they are."""
+    """Make the micropolygons of a scene: patches diced to ``size`` pixels an edge, triangles as they are."""
     if scene.patches is not None:
         return from_patches(scene.patches, matrix, width, height, size, triangles)
     if scene.mesh is None:
@@ -130,7 +130,8 @@ def _shades(polygons: NDArray[np.float64]) -> NDArray[np.uint8]:
     normals = np.cross(points[:, 2] - points[:, 0], points[:, -1] - points[:, 1])
     length = np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
     lit = np.abs(normals @ LIGHT) / length
-    return (40.0 + 200.0 * np.minimum(lit, 1.0)).astype(np.uint8)
+    shades: NDArray[np.uint8] = (40.0 + 200.0 * np.minimum(lit, 1.0)).astype(np.uint8)
+    return shades
 
 
 def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:

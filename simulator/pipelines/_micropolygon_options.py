@@ -1,0 +1,31 @@
+"""What the micropolygon pipelines of 2009 and 2012 share: their input, and their picture as a frame."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.frame import Frame
+from simulator.stages.micropolygon_samples import Samples, picture, visible
+from simulator.stages.micropolygons import Micropolygons
+from simulator.work import Work
+
+
+def frame_of(samples: Samples, polygons: Micropolygons, works: list[Work], **facts: Any) -> Frame:
+    """Gather a frame: the picture, the nearest depth of each pixel's first sample, ids of patches or triangles."""
+    depth = samples.depth.reshape(samples.height, samples.width, -1)[:, :, 0]
+    found = {"micropolygons": len(polygons.patch), "dropped_polygons": polygons.dropped}
+    return Frame(
+        image=picture(samples, polygons),
+        depth=np.where(np.isinf(depth), np.float32(1.0), depth),
+        works=works,
+        triangle_ids=visible(samples, polygons.patch),
+        maps={"tests": samples.tests, "micropolygons": visible(samples)},
+        facts={**found, **facts},
+    )
+
+
+def wrong_pixels(samples: Samples, exact: Samples) -> NDArray[np.bool_]:
+    """Pixels, (H, W), with a sample that shows another micropolygon than the exact picture."""
+    wrong: NDArray[np.bool_] = (samples.polygon != exact.polygon).reshape(samples.height, samples.width, -1).any(axis=2)
+    return wrong

@@ -1,0 +1,47 @@
+"""Across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009, without blur)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.pipelines._micropolygon_options import frame_of
+from simulator.scenes.scene import Scene
+from simulator.stages.across_polygons import Packing
+from simulator.stages.across_polygons import across_polygons as walk_boxes
+from simulator.stages.micropolygon_samples import new_samples
+from simulator.stages.micropolygons import micropolygons
+from simulator.stages.sample_positions import sample_positions
+
+
+def across_polygons(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    packing: Packing = "in-order",
+    spp: int = 1,
+    positions: str | None = None,
+    edge: float = 1.0,
+    triangles: bool = False,
+    maps: Sequence[str] = (),  # noqa: ARG001 - the map of tests comes for nothing
+) -> Frame:
+    """Micropolygons in parallel: a lane each, warps as long as their longest lane.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        As for every pipeline.
+    packing : {"in-order", "sorted", "repacked"}
+        How polygons come to lanes.
+    spp, positions, edge, triangles
+        As for ``stamps``.
+    """
+    samples = new_samples(width, height, sample_positions(spp, positions))
+    polygons = micropolygons(scene, matrix, width, height, edge, triangles)
+    work = walk_boxes(polygons, samples, packing, simt)
+    return frame_of(samples, polygons, [work])

@@ -1,0 +1,60 @@
+"""Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.pipelines._micropolygon_options import frame_of
+from simulator.scenes.scene import Scene
+from simulator.stages.micropolygon_samples import new_samples
+from simulator.stages.micropolygons import micropolygons
+from simulator.stages.sample_positions import sample_positions
+from simulator.stages.stamps import Touch, stamp_shape
+from simulator.stages.stamps import stamps as draw_stamps
+
+
+def stamps(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    stamp: int | tuple[int, int] = 8,
+    touch: Touch = "box",
+    coarse: int = 0,
+    spp: int = 1,
+    positions: str | None = None,
+    edge: float = 1.0,
+    triangles: bool = False,
+    maps: Sequence[str] = (),  # noqa: ARG001 - the map of tests comes for nothing
+) -> Frame:
+    """Micropolygons by stamps: n x n pixels tested at once, one level or two.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        As for every pipeline.
+    stamp : int or (int, int)
+        Width and height of a stamp in pixels.
+    touch : {"box", "polygon"}
+        Which stamps are tested: those that touch the polygon's box, or that the polygon reaches.
+    coarse : int
+        Side of the coarse stamp that culls or accepts first, 0 for one level.
+    spp : int
+        Samples a pixel, 1 to 16.
+    positions : str, optional
+        File of sample positions.
+    edge : float
+        Micropolygons of patches have edges of at most so many pixels.
+    triangles : bool
+        Split micropolygons into triangles.
+    """
+    shape = stamp_shape(stamp, touch, coarse)
+    samples = new_samples(width, height, sample_positions(spp, positions))
+    polygons = micropolygons(scene, matrix, width, height, edge, triangles)
+    work = draw_stamps(polygons, samples, shape, simt)
+    return frame_of(samples, polygons, [work])
