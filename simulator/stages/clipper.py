@@ -57,9 +57,10 @@ def clip_triangle(corners, polygon, spare, plane, steps):
     int
         Vertices of the clipped polygon, 0 or 3 to 9 (barring rounding).
     """
-    polygon[:3] = np.float32(0)
+    for k in range(3):
+        polygon[k, 0] = polygon[k, 1] = np.float32(0)
+        steps[2 * k] = steps[2 * k + 1] = 0
     polygon[1, 0] = polygon[2, 1] = _ONE
-    steps[:] = 0
     n = 3
     for axis in range(3):
         outside = False
@@ -75,14 +76,14 @@ def clip_triangle(corners, polygon, spare, plane, steps):
                 plane[k] = (corners[k, 3] - corners[0, 3]) + sign * run
             steps[2 * axis + side] = n if n >= 3 else 0
             n = _clip_plane(plane, polygon, spare, n)
-            polygon[:n] = spare[:n]
+            for i in range(n):
+                polygon[i, 0], polygon[i, 1] = spare[i, 0], spare[i, 1]
     return n if n >= 3 else 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def polygon_vertex(corners, polygon, i, vertex):
-    """Clip position of vertex i of the clipped polygon."""
-    for c in range(4):
-        first = corners[1, c] - corners[0, c]
-        second = corners[2, c] - corners[0, c]
-        vertex[c] = fma(second, polygon[i, 1], fma(first, polygon[i, 0], corners[0, c]))
+def polygon_component(corners, polygon, i, c):
+    """Component c of the clip position of vertex i of the clipped polygon."""
+    first = corners[1, c] - corners[0, c]
+    second = corners[2, c] - corners[0, c]
+    return fma(second, polygon[i, 1], fma(first, polygon[i, 0], corners[0, c]))

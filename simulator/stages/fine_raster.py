@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.simt import Coalescing, Simt
+from simulator.stages.borrow import borrow
 from simulator.stages.fine_raster_multi import draw_tile_multi
 from simulator.stages.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent, corner, new_tile, start_tile
 from simulator.stages.fine_raster_single import draw_tile_single
@@ -89,9 +90,21 @@ def _count_tile(draw, row):
 
 
 @njit(cache=True, nogil=True)
-def _draw_tiles(first, last, active, starts, entries, setup, colors, draw, buffers, table):
-    """Draw active tiles first..last-1."""
+def _draw_chunk(first, last, active, starts, entries, setup, colors, draw, buffers, table):
+    """Draw active tiles first..last-1, through arrays without reference counts."""
     tile = new_tile(1 << draw.log_samples)
+    lists = borrow(starts), borrow(entries)
+    lent = borrow(tile), borrow(setup), borrow(colors), borrow(buffers)
+    if table is None:
+        _draw_tiles(first, last, active, lists, *lent, draw, None)
+    else:
+        _draw_tiles(first, last, active, lists, *lent, draw, borrow(table))
+    tile.state[0] = 0  # the owner lives to here
+
+
+@njit(cache=True, nogil=True)
+def _draw_tiles(first, last, active, lists, tile, setup, colors, buffers, draw, table):
+    starts, entries = lists
     for a in range(first, last):
         t = active[a]
         left, bottom = corner(t, draw)
@@ -119,7 +132,7 @@ def draw_tile(setup, entries, colors, draw, tile, left, bottom, row):
 def _draw_all(active, starts, entries, setup, colors, draw, buffers, table):
     for c in prange((active.size + _CHUNK - 1) // _CHUNK):
         last = min((c + 1) * _CHUNK, active.size)
-        _draw_tiles(c * _CHUNK, last, active, starts, entries, setup, colors, draw, buffers, table)
+        _draw_chunk(c * _CHUNK, last, active, starts, entries, setup, colors, draw, buffers, table)
 
 
 def new_buffers(width: int, height: int, samples: int = 1) -> FrameBuffers:

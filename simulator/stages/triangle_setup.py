@@ -14,17 +14,10 @@ from numpy.typing import NDArray
 from models.coalescing import transactions
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.clipper import MAX_VERTICES, clip_triangle, polygon_vertex
-from simulator.stages.subtriangle import (
-    Corners,
-    View,
-    cull,
-    make_counter_clockwise,
-    snap,
-    store_attribute_planes,
-    store_depth_plane,
-    store_header,
-)
+from simulator.stages.clipper import MAX_VERTICES, clip_triangle, polygon_component
+from simulator.stages.borrow import borrow
+from simulator.stages.plane_equation import reciprocal_area
+from simulator.stages.subtriangle import View, cull, snap, store_attribute_planes, store_depth_plane, store_header
 from simulator.work import Work
 
 Release = Literal["1.1", "nvdiffrast"]
@@ -93,74 +86,110 @@ class Setup(NamedTuple):
     inputs: NDArray[np.int32]  # (S,) input triangle
 
 
+class Scratch(NamedTuple):
+    """Working memory of one worker."""
+
+    clip: NDArray[np.float32]  # (3, 4) corners of the triangle in hand
+    polygon: NDArray[np.float32]  # (n, 2) barycentrics of its clipped polygon
+    spare: NDArray[np.float32]
+    plane: NDArray[np.float32]
+    steps: NDArray[np.int64]  # (6,) vertices walked at each clip plane
+    longest: NDArray[np.int64]  # (10,) maxima over the warp
+    lanes: NDArray[np.int64]  # (32,) addresses
+    read: NDArray[np.bool_]  # (32,) triangles with indices in range
+
+
 @njit(cache=True, nogil=True)
-def _outside(clip):
+def _new_scratch():
+    f32, i64 = np.float32, np.int64
+    return Scratch(
+        np.empty((3, 4), f32), np.empty((MAX_VERTICES, 2), f32), np.empty((MAX_VERTICES, 2), f32), np.empty(3, f32),
+        np.zeros(6, i64), np.zeros(10, i64), np.empty(WARP, i64), np.zeros(WARP, np.bool_),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _beyond(x0, w0, x1, w1, x2, w2):
+    """Whether three corners lie beyond one of the two view planes of an axis."""
+    return (w0 < x0 and w1 < x1 and w2 < x2) or (w0 < -x0 and w1 < -x1 and w2 < -x2)
+
+
+@njit(cache=True, nogil=True)
+def _outside(c):
     """Whether all corners lie beyond one view plane (only looked at where the first corner is outside)."""
-    w = clip[:, 3]
-    if not (w[0] < abs(clip[0, 0]) or w[0] < abs(clip[0, 1]) or w[0] < abs(clip[0, 2])):
+    w0, w1, w2 = c[0, 3], c[1, 3], c[2, 3]
+    if not (w0 < abs(c[0, 0]) or w0 < abs(c[0, 1]) or w0 < abs(c[0, 2])):
         return False
-    for c in range(3):
-        if w[0] < clip[0, c] and w[1] < clip[1, c] and w[2] < clip[2, c]:
-            return True
-        if w[0] < -clip[0, c] and w[1] < -clip[1, c] and w[2] < -clip[2, c]:
-            return True
-    return False
+    return (
+        _beyond(c[0, 0], w0, c[1, 0], w1, c[2, 0], w2)
+        or _beyond(c[0, 1], w0, c[1, 1], w1, c[2, 1], w2)
+        or _beyond(c[0, 2], w0, c[1, 2], w1, c[2, 2], w2)
+    )
 
 
 @njit(cache=True, nogil=True)
-def _inside(clip, axes_from):
-    """Whether no corner leaves the frustum along the axes from ``axes_from`` on; a NaN coordinate counts as inside."""
+def _inside(clip, first_axis):
+    """Whether no corner leaves the frustum along the axes from ``first_axis`` on; a NaN among numbers is ignored."""
     for k in range(3):
         seen = False
-        for c in range(axes_from, 3):
-            magnitude = abs(clip[k, c])
-            if clip[k, 3] < magnitude:
+        w = clip[k, 3]
+        for axis in range(first_axis, 3):
+            magnitude = abs(clip[k, axis])
+            if w < magnitude:
                 return False
             seen |= magnitude >= np.float32(0)
-        if not seen or not clip[k, 3] == clip[k, 3]:  # noqa: PLR0124, SIM201 - NaN
+        if not seen or w != w:  # noqa: PLR0124 - NaN
             return False
     return True
 
 
 @njit(cache=True, nogil=True)
-def _in_guard_band(snapped):
-    low, high = snapped.min(), snapped.max()
+def _in_guard_band(a, b, c):
+    low, high = min(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy), max(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy)
     return low >= -GUARD_BAND - 1 and high <= GUARD_BAND and high - low <= GUARD_BAND
 
 
 @njit(cache=True, nogil=True)
-def _store(corners, area, view, out, slot, t, triangles):
-    """Write header and data record of one sub-triangle."""
+def _store(a, b, c, area, view, out, slot, t, triangles):
+    """Write header and data record of one sub-triangle; a clockwise one with vertices 1 and 2 swapped."""
     if area < 0:
-        make_counter_clockwise(corners)
-    out.misc[slot] = store_header(corners, view, out.headers[slot])
+        b, c, area = c, b, -area
+    store_header(a, b, c, view, out.headers, out.misc, slot)
     out.inputs[slot] = t
-    record = out.planes[slot]
+    mantissa, shift = reciprocal_area(area)
     if view.depth:
-        store_depth_plane(corners, abs(area), view, record)
-    if record.size == 4:
-        record[3] = np.uint32(t + 1)
+        store_depth_plane(a, b, c, mantissa, shift, view, out.planes, slot)
+    if out.planes.shape[1] == 4:
+        out.planes[slot, 3] = np.uint32(t + 1)
         return
     if view.interpolate:
-        store_attribute_planes(corners, abs(area), view, record)
+        store_attribute_planes(a, b, c, mantissa, shift, view, out.planes, slot)
     for k in range(3):
-        record[13 + k] = np.uint32(triangles[t, k])
+        out.planes[slot, 13 + k] = np.uint32(triangles[t, k])
 
 
 @njit(cache=True, nogil=True)
-def _fan(source, corners, polygon, n, view, out, slot, t, triangles):
+def _fan_corner(clip, polygon, i, view):
+    x, y = polygon_component(clip, polygon, i, 0), polygon_component(clip, polygon, i, 1)
+    z, w = polygon_component(clip, polygon, i, 2), polygon_component(clip, polygon, i, 3)
+    return snap(x, y, z, w, polygon[i, 0], polygon[i, 1], view)
+
+
+@njit(cache=True, nogil=True)
+def _fan(clip, polygon, n, view, out, slot, t, triangles):
     """Count the surviving triangles of a clipped polygon; from ``slot`` on, where not negative, write them."""
     kept = 0
+    if n < 3:
+        return kept
+    a, b = _fan_corner(clip, polygon, 0, view), _fan_corner(clip, polygon, 1, view)
     for i in range(2, n):
-        for k, at in enumerate((0, i - 1, i)):
-            polygon_vertex(source, polygon, at, corners.clip[k])
-            corners.barycentric[k] = polygon[at]
-        snap(corners, view)
-        outcome, area = cull(corners.snapped, view)
+        c = _fan_corner(clip, polygon, i, view)
+        outcome, area = cull(a, b, c, view)
         if outcome == 0:
             if slot >= 0:
-                _store(corners, area, view, out, slot + kept, t, triangles)
+                _store(a, b, c, area, view, out, slot + kept, t, triangles)
             kept += 1
+        b = c
     return kept
 
 
@@ -171,67 +200,70 @@ def _load(positions, triangles, t, clip):
         v = triangles[t, k]
         if v < 0 or v >= positions.shape[0]:
             return False
-        clip[k] = positions[v]
+        for c in range(4):
+            clip[k, c] = positions[v, c]
     return True
 
 
 @njit(cache=True, nogil=True)
-def _fast_path(corners, view, out, t, triangles):
+def _fast_path(clip, view, out, t, triangles):
     """Outcome of a triangle that needs no clipping (_CLIPPED where it does); a kept one is written to its own slot."""
-    if _outside(corners.clip):
+    if _outside(clip):
         return _OUTSIDE
-    if not _inside(corners.clip, 2 if view.guard_band else 0):
+    if not _inside(clip, 2 if view.guard_band else 0):
         return _CLIPPED
-    snap(corners, view)
-    if view.guard_band and not _in_guard_band(corners.snapped):
+    zero, one = np.float32(0), np.float32(1)
+    a = snap(clip[0, 0], clip[0, 1], clip[0, 2], clip[0, 3], zero, zero, view)
+    b = snap(clip[1, 0], clip[1, 1], clip[1, 2], clip[1, 3], one, zero, view)
+    c = snap(clip[2, 0], clip[2, 1], clip[2, 2], clip[2, 3], zero, one, view)
+    if view.guard_band and not _in_guard_band(a, b, c):
         return _CLIPPED
-    outcome, area = cull(corners.snapped, view)
+    outcome, area = cull(a, b, c, view)
     if outcome == 0:
-        corners.barycentric[:] = np.float32(0)
-        corners.barycentric[1, 0] = corners.barycentric[2, 1] = np.float32(1)
-        _store(corners, area, view, out, t, t, triangles)
+        _store(a, b, c, area, view, out, t, t, triangles)
     return outcome
 
 
 @njit(cache=True, nogil=True)
-def _clip_and_store(source, corners, scratch, plane, steps, view, out, slot, t, triangles):
+def _clip_and_store(scratch, view, out, slot, t, triangles):
     """Clip one triangle and write what survives (a single survivor to the own slot); returns survivors and fan size."""
-    n = clip_triangle(source, scratch[0], scratch[1], plane, steps)
-    kept = _fan(source, corners, scratch[0], n, view, out, slot, t, triangles)
+    clip, polygon = scratch.clip, scratch.polygon
+    n = clip_triangle(clip, polygon, scratch.spare, scratch.plane, scratch.steps)
+    kept = _fan(clip, polygon, n, view, out, slot, t, triangles)
     if kept == 1 and slot < 0:
-        _fan(source, corners, scratch[0], n, view, out, t, t, triangles)
+        _fan(clip, polygon, n, view, out, t, t, triangles)
     return kept, max(n - 2, 0)
 
 
 @njit(cache=True, nogil=True)
-def _longest(row, warp_longest, column, lane_value, i):
+def _longest(table, block, column, value, longest, i):
     """Add one lane to a pair of columns: steps of the longest lane of the warp, and lane steps."""
-    row[column + 1] += lane_value
-    if lane_value > warp_longest[i]:
-        row[column] += lane_value - warp_longest[i]
-        warp_longest[i] = lane_value
+    table[block, column + 1] += value
+    if value > longest[i]:
+        table[block, column] += value - longest[i]
+        longest[i] = value
 
 
 @njit(cache=True, nogil=True)
-def _count_lane(row, longest, outcome, kept, fan, steps):
+def _count_lane(table, block, longest, outcome, kept, fan, steps):
     """Count one thread; ``longest`` holds the warp's maxima so far."""
-    row[1] += 1
+    table[block, 1] += 1
     if outcome == _OUTSIDE:
-        row[_VIEWPORT_CULLED] += 1
+        table[block, _VIEWPORT_CULLED] += 1
         return
-    _longest(row, longest, 3, 1, 0)
+    _longest(table, block, 3, 1, longest, 0)
     if outcome > 0:
-        row[4 + outcome] += 1
+        table[block, 4 + outcome] += 1
     elif outcome == 0:
-        _longest(row, longest, _STORE_STEPS, 1, 1)
+        _longest(table, block, _STORE_STEPS, 1, longest, 1)
     else:
-        _longest(row, longest, 7, 1, 2)
+        _longest(table, block, 7, 1, longest, 2)
         for p in range(6):
-            _longest(row, longest, _CLIP_STEPS, steps[p], 3 + p)
-        _longest(row, longest, _FAN_STEPS, fan, 9)
-        _longest(row, longest, _STORE_STEPS, kept, 1)
+            _longest(table, block, _CLIP_STEPS, steps[p], longest, 3 + p)
+        _longest(table, block, _FAN_STEPS, fan, longest, 9)
+        _longest(table, block, _STORE_STEPS, kept, longest, 1)
         if kept >= 2:
-            row[16] += 1
+            table[block, 16] += 1
 
 
 @njit(cache=True, nogil=True)
@@ -275,54 +307,59 @@ def _count_warp(row, allocating, positions_read, triangles, t0, t1, out, simt, l
 
 
 @njit(cache=True, nogil=True)
-def _setup_range(begin, end, positions, triangles, view, simt, out, table):
+def _setup_range(begin, end, positions, triangles, view, simt, out, scratch, table):
     """All triangles of some whole blocks; those with two or more sub-triangles are only counted here."""
-    f32 = np.float32
-    corners = Corners(np.empty((3, 4), f32), np.empty((3, 2), f32), np.empty((3, 2), np.int64), np.empty(3, f32))
-    source = np.empty((3, 4), f32)
-    scratch, plane = np.empty((2, MAX_VERTICES, 2), f32), np.empty(3, f32)
-    steps = np.zeros(6, np.int64)
-    longest, lanes, read = np.zeros(10, np.int64), np.empty(WARP, np.int64), np.zeros(WARP, np.bool_)
+    clip, longest, lanes, read = scratch.clip, scratch.longest, scratch.lanes, scratch.read
     for warp in range(begin, end, WARP):
         last = min(warp + WARP, end)
-        allocating, longest[:] = 0, 0
+        allocating = 0
+        for i in range(10):
+            longest[i] = 0
         for t in range(warp, last):
             out.first[t] = t
             kept, fan, outcome = 0, 0, _OUTSIDE
-            read[t - warp] = _load(positions, triangles, t, corners.clip)
+            read[t - warp] = _load(positions, triangles, t, clip)
             if read[t - warp]:
-                outcome = _fast_path(corners, view, out, t, triangles)
+                outcome = _fast_path(clip, view, out, t, triangles)
                 kept = 1 if outcome == 0 else 0
             if outcome == _CLIPPED:
-                source[:] = corners.clip
-                kept, fan = _clip_and_store(source, corners, scratch, plane, steps, view, out, -1, t, triangles)
+                kept, fan = _clip_and_store(scratch, view, out, -1, t, triangles)
                 allocating += 1 if kept >= 2 else 0
             out.subtriangles[t] = kept
             if table is not None:
-                _count_lane(table[t // BLOCK], longest, outcome, kept, fan, steps)
+                _count_lane(table, t // BLOCK, longest, outcome, kept, fan, scratch.steps)
         if table is not None:
             _count_warp(table[warp // BLOCK], allocating, read, triangles, warp, last, out, simt, lanes)
+
+
+@njit(cache=True, nogil=True)
+def _setup_chunk(begin, end, positions, triangles, view, simt, out, table):
+    """Take a chunk of the triangles, through arrays without reference counts."""
+    scratch = _new_scratch()
+    positions, triangles, out, lent = borrow(positions), borrow(triangles), borrow(out), borrow(scratch)
+    if table is None:
+        _setup_range(begin, end, positions, triangles, view, simt, out, lent, None)
+    else:
+        _setup_range(begin, end, positions, triangles, view, simt, out, lent, borrow(table))
+    scratch.steps[0] = 0  # the owner lives to here
 
 
 @njit(cache=True, nogil=True, parallel=True)
 def _setup_all(positions, triangles, view, simt, out, table):
     chunk = _CHUNK_BLOCKS * BLOCK
     for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _setup_range(c * chunk, min((c + 1) * chunk, triangles.shape[0]), positions, triangles, view, simt, out, table)
+        _setup_chunk(c * chunk, min((c + 1) * chunk, triangles.shape[0]), positions, triangles, view, simt, out, table)
 
 
 @njit(cache=True, nogil=True)
 def _setup_several(several, positions, triangles, view, out):
     """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
-    f32 = np.float32
-    corners = Corners(np.empty((3, 4), f32), np.empty((3, 2), f32), np.empty((3, 2), np.int64), np.empty(3, f32))
-    source = np.empty((3, 4), f32)
-    scratch, plane = np.empty((2, MAX_VERTICES, 2), f32), np.empty(3, f32)
-    steps = np.zeros(6, np.int64)
+    scratch = _new_scratch()
+    clip = scratch.clip
     for t in several:
-        _load(positions, triangles, t, source)
+        _load(positions, triangles, t, clip)
         out.misc[t] = out.first[t]
-        _clip_and_store(source, corners, scratch, plane, steps, view, out, out.first[t], t, triangles)
+        _clip_and_store(scratch, view, out, out.first[t], t, triangles)
 
 
 def make_view(

@@ -1,0 +1,42 @@
+"""Arrays without reference counts, for kernels that pass them through many small functions.
+
+Compiled code counts references to an array with locked instructions. A kernel that hands arrays on for every triangle
+spends more time there than on the triangle, and threads that share an array fight over its counter.
+"""
+
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+
+def borrow(arrays: Any) -> Any:
+    """View of an array, or of a tuple of arrays, that the caller keeps alive; interpreted code gets it back as it is."""
+    return arrays
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """Clear the owner of an array value, or of all arrays in a tuple value."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value=value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        return array._getvalue()  # noqa: SLF001 - the documented way to build a value
+    if isinstance(kind, types.BaseTuple):
+        for i, part in enumerate(kind.types):
+            cleared = _without_owner(context, builder, part, builder.extract_value(value, i))
+            value = builder.insert_value(value, cleared, i)
+    return value
+
+
+@intrinsic
+def _borrow(_context: Any, arrays: Any) -> Any:
+    def codegen(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return _without_owner(context, builder, arrays, args[0])
+
+    return arrays(arrays), codegen
+
+
+@overload(borrow)
+def _borrow_compiled(arrays):  # noqa: ANN001, ANN202 - numba compares the signatures, annotations included
+    return lambda arrays: _borrow(arrays)
