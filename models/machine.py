@@ -11,133 +11,16 @@ import hashlib
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import msgspec
 
 from models.errors import TilestampError
+from models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from models.simt import AtomicMerge, Coalescing, Simt
 
 FOLDER = Path(__file__).parent / "machines"
 Provenance = Literal["published", "measured", "derived", "fitted", "assumed"]
-Count = Annotated[int, msgspec.Meta(ge=1)]
-Size = Annotated[int, msgspec.Meta(ge=0)]
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Amount = Annotated[float, msgspec.Meta(ge=0)]
-
-
-class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the machine is."""
-
-    name: str
-    description: str
-    compute_capability: str
-
-
-class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A multiprocessor: schedulers, and what resident blocks share."""
-
-    count: Count
-    warp_size: Count
-    schedulers: Count
-    clock_mhz: Positive
-    max_warps: Count
-    max_threads: Count
-    max_blocks: Count
-    max_threads_per_block: Count
-    registers: Count
-    register_unit: Count  # registers are allotted in multiples of this
-    register_allocation: Literal["block", "warp"]  # to whom
-    warp_granularity: Count  # warps of a block (1.x) or of an SM (later) that get registers come in multiples of this
-    max_registers_per_thread: Count
-    shared_bytes: Size
-    shared_unit_bytes: Count
-    reserved_shared_bytes: Size  # that the system takes from every block
-
-
-class Issue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Cycles for which one warp instruction holds its scheduler, by class."""
-
-    fp32: Amount
-    int32: Amount
-    mul32: Amount
-    sfu: Amount
-    control: Amount
-    shared: Amount
-    load: Amount
-    store: Amount
-    atomic: Amount
-    shared_atomic: Amount
-    barrier: Amount
-
-
-class Pipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Cycles for which one warp instruction holds the execution unit behind its scheduler; 0: never longer than issue.
-
-    The units work side by side, so the fullest one counts: fp32, int32 with control, mul32, sfu.
-    """
-
-    fp32: Amount
-    int32: Amount
-    mul32: Amount
-    sfu: Amount
-    control: Amount
-
-
-class Latency(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Cycles that a dependent instruction waits."""
-
-    alu_cycles: Positive
-    shared_cycles: Positive
-    l2_cycles: Amount  # 0 where there is no L2 for data
-    dram_cycles: Positive
-    atomic_cycles: Positive
-    barrier_cycles: Amount
-    block_launch_cycles: Amount  # from a free place on the SM to the first instruction of the block put there
-
-
-class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Widths and sizes of the memory system."""
-
-    coalescing: Literal["half_warp_segments", "warp_lines", "warp_sectors"]
-    dram_gb_per_s: Positive
-    dram_efficiency: Annotated[float, msgspec.Meta(gt=0, le=1)]  # best sustained share of dram_gb_per_s
-    l2_bytes: Size  # 0: no cache between the SMs and DRAM
-    l2_line_bytes: Count
-    l2_bytes_per_clock: Amount  # all SMs together
-    l1_bytes_per_clock: Positive  # global loads and stores of one SM
-    banks: Count
-    bank_lanes: Count
-    bank_pass_cycles: Positive  # one pass of one group of bank_lanes
-
-
-class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where global atomics are performed, and how fast."""
-
-    place: Literal["dram_lock", "l2_unit"]
-    merge: Literal["none", "sector"]
-    unit_bytes: Count  # consecutive bytes that one lock or unit owns
-    units: Size  # units that the addresses are dealt to; 0: each stretch of unit_bytes has its own
-    unit_ns_per_request: Amount  # for which the unit is held
-    requests_per_clock: Positive  # all units together, at different addresses
-    conflict_ns: Amount  # further time of the whole memory system for a lane that an earlier lane of its warp blocks
-
-
-class Launching(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a launch costs besides its work."""
-
-    kernel_us: Amount  # of a kernel's own duration
-    stream_us: Amount  # from one empty kernel to the next in a stream
-    graph_us: Amount  # the same in a graph; stream_us where there are no graphs
-    sync_us: Amount  # launch and wait for the result
-    blocks_per_us: Positive
-
-
-class FixedFunction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The fixed-function pipe: what each unit does in a clock, all copies of it together."""
-
-    clock_mhz: Positive
-    per_clock: dict[str, Positive]
 
 
 class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
