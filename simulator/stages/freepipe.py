@@ -24,7 +24,7 @@ from models.atomics import CHUNK_BYTES
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
-from simulator.stages.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
+from simulator.stages.freepipe_triangle import SUBPIXEL_BITS, Pieces, _fixed_depth, _start_edges, make_pieces
 from simulator.stages.freepipe_warp import WARP, FrameShape, FreePipeEvent, _blocks
 from simulator.work import Work
 
@@ -59,7 +59,7 @@ def _draw_strip(pieces, first_row, end_row, colors, frame, halves, tied):
             box = pieces.box[p]
             if box[1] < box[0] or box[3] < first_row or box[2] >= end_row:
                 continue
-            _start_edges(pieces.corner[p], box[0], box[2], edge)
+            _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], edge)
             row_depth = pieces.depth[p, 0]
             for y in range(box[2], min(np.int64(box[3]) + 1, end_row)):
                 if y >= first_row:

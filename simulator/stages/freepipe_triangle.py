@@ -15,6 +15,7 @@ from simulator.stages.exact import fma, round_to_int32
 
 NOTHING, INSIDE, CLIPPED = 0, 1, 2  # what a thread does with its triangle
 PLANES = 6
+SUBPIXEL_BITS = 4
 MAX_POLYGON = 10
 _F0, _F1 = np.float32(0), np.float32(1)
 
@@ -24,9 +25,10 @@ class Pieces(NamedTuple):
 
     kind: NDArray[np.uint8]  # (F,) NOTHING, INSIDE or CLIPPED
     first: NDArray[np.int64]  # (F + 1,) first piece of each input triangle
-    corner: NDArray[np.int32]  # (P, 6) x0 y0 x1 y1 x2 y2, 1/16 pixel from the lower-left corner, counter-clockwise
+    corner: NDArray[np.int32]  # (P, 6) x0 y0 x1 y1 x2 y2, sub-pixels from the lower-left, counter-clockwise
     box: NDArray[np.int32]  # (P, 4) first and last pixel column, first and last row; empty where last < first
-    depth: NDArray[np.float32]  # (P, 3) NDC depth at the first pixel's centre, its slopes a 1/16 pixel in x and y
+    facing: NDArray[np.int8]  # (P,) 1 counter-clockwise as it came, -1 clockwise, 0 without area
+    depth: NDArray[np.float32]  # (P, 3) NDC depth at the first pixel's centre, its slopes a sub-pixel in x and y
 
 
 @njit(cache=True, nogil=True)
@@ -95,38 +97,48 @@ def _classify(polygon, spare):
     return CLIPPED, max(_clip(polygon, spare) - 2, 0)
 
 
+@njit(cache=True, nogil=True)
+def _pixels(a, b, c, bits, size):
+    """First and last pixel whose centre lies between the least and the largest of three coordinates."""
+    half = 1 << (bits - 1)
+    return max((min(a, b, c) + half - 1) >> bits, 0), min((max(a, b, c) - half) >> bits, size - 1)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _piece(vertices, width, height, corner, box, depth):
-    """Project and snap three clip positions, and find box and depth plane."""
+def _piece(vertices, width, height, bits, corner, box, depth):
+    """Project and snap three clip positions, and find box and depth plane; returns which way it faces."""
+    half = 1 << (bits - 1)
     z = depth  # the place of the result serves for the corners' depths first
     for k in range(3):
         v = vertices[k]
         r = _F1 / v[3]
-        corner[2 * k] = round_to_int32(v[0] * r * np.float32(8 * width)) + 8 * width
-        corner[2 * k + 1] = round_to_int32(v[1] * r * np.float32(8 * height)) + 8 * height
+        corner[2 * k] = round_to_int32(v[0] * r * np.float32(half * width)) + half * width
+        corner[2 * k + 1] = round_to_int32(v[1] * r * np.float32(half * height)) + half * height
         z[k] = v[2] * r
     x0, y0, x1, y1, x2, y2 = corner[0], corner[1], corner[2], corner[3], corner[4], corner[5]
     z0, z1, z2 = z[0], z[1], z[2]
     area = (np.int64(x1) - x0) * (np.int64(y2) - y0) - (np.int64(y1) - y0) * (np.int64(x2) - x0)
     box[0], box[1], box[2], box[3] = 0, -1, 0, -1
     if area == 0:
-        return
+        return 0
+    facing = 1 if area > 0 else -1
     if area < 0:
         x1, y1, z1, x2, y2, z2 = x2, y2, z2, x1, y1, z1
         corner[2], corner[3], corner[4], corner[5] = x1, y1, x2, y2
         area = -area
-    box[0], box[1] = max((min(x0, x1, x2) + 7) >> 4, 0), min((max(x0, x1, x2) - 8) >> 4, width - 1)
-    box[2], box[3] = max((min(y0, y1, y2) + 7) >> 4, 0), min((max(y0, y1, y2) - 8) >> 4, height - 1)
+    box[0], box[1] = _pixels(x0, x1, x2, bits, width)
+    box[2], box[3] = _pixels(y0, y1, y2, bits, height)
     r = _F1 / np.float32(area)
     dx0, dy0, dx2, dy2 = np.float32(x1 - x0), np.float32(y1 - y0), np.float32(x0 - x2), np.float32(y0 - y2)
     slope_x = (-((z2 - z0) * dy0) + (z1 - z0) * -dy2) * r
     slope_y = ((z2 - z0) * dx0 + (z1 - z0) * dx2) * r
-    to_x, to_y = np.float32(box[0] * 16 + 8 - x0), np.float32(box[2] * 16 + 8 - y0)
+    to_x, to_y = np.float32((box[0] << bits) + half - x0), np.float32((box[2] << bits) + half - y0)
     depth[0], depth[1], depth[2] = z0 + slope_x * to_x + slope_y * to_y, slope_x, slope_y
+    return facing
 
 
 @njit(cache=True, nogil=True)
-def _thread(positions, triangles, t, width, height, polygon, spare, fan, pieces):
+def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces):
     """Clip triangle t and count its pieces; write them where ``pieces`` is given."""
     for k in range(3):
         _copy(positions[triangles[t, k]], polygon[k])
@@ -136,46 +148,48 @@ def _thread(positions, triangles, t, width, height, polygon, spare, fan, pieces)
             for k in range(3):
                 _copy(polygon[i + k if k else 0], fan[k])
             p = pieces.first[t] + i
-            _piece(fan, width, height, pieces.corner[p], pieces.box[p], pieces.depth[p])
+            pieces.facing[p] = _piece(fan, width, height, bits, pieces.corner[p], pieces.box[p], pieces.depth[p])
     return kind, n
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _classify_all(positions, triangles, width, height, chunk, kind, count):
+def _classify_all(positions, triangles, chunk, kind, count):
     for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _classify_range(positions, triangles, width, height, c * chunk, chunk, kind, count)
+        _classify_range(positions, triangles, c * chunk, chunk, kind, count)
 
 
 @njit(cache=True, nogil=True)
-def _classify_range(positions, triangles, width, height, first, chunk, kind, count):
+def _classify_range(positions, triangles, first, chunk, kind, count):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     for t in range(first, min(first + chunk, triangles.shape[0])):
-        kind[t], count[t] = _thread(positions, triangles, t, width, height, polygon, spare, polygon, None)
+        kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, polygon, spare, polygon, None)
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _project_all(positions, triangles, width, height, chunk, pieces):
+def _project_all(positions, triangles, width, height, bits, chunk, pieces):
     for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _project_range(positions, triangles, width, height, c * chunk, chunk, pieces)
+        _project_range(positions, triangles, width, height, bits, c * chunk, chunk, pieces)
 
 
 @njit(cache=True, nogil=True)
-def _project_range(positions, triangles, width, height, first, chunk, pieces):
+def _project_range(positions, triangles, width, height, bits, first, chunk, pieces):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     fan = np.empty((3, 4), np.float32)
     for t in range(first, min(first + chunk, triangles.shape[0])):
-        _thread(positions, triangles, t, width, height, polygon, spare, fan, pieces)
+        _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces)
 
 
 @njit(cache=True, nogil=True)
-def _start_edges(corner, x, y, edge):
+def _start_edges(corner, bits, x, y, edge):
     """Edge functions at the centre of pixel (x, y), less one where the edge does not own its points."""
+    half = np.int64(1) << (bits - 1)
+    center_x, center_y = (np.int64(x) << bits) + half, (np.int64(y) << bits) + half
     for k in range(3):
         j = 2 * ((k + 1) % 3)
         dx, dy = np.int64(corner[j]) - corner[2 * k], np.int64(corner[j + 1]) - corner[2 * k + 1]
         owns = dy < 0 or (dy == 0 and dx > 0)
-        edge[k] = dx * (16 * y + 8 - corner[2 * k + 1]) - dy * (16 * x + 8 - corner[2 * k]) - (0 if owns else 1)
-        edge[3 + 2 * k], edge[4 + 2 * k] = 16 * dx, 16 * dy
+        edge[k] = dx * (center_y - corner[2 * k + 1]) - dy * (center_x - corner[2 * k]) - (0 if owns else 1)
+        edge[3 + 2 * k], edge[4 + 2 * k] = dx << bits, dy << bits
 
 
 @njit(cache=True, nogil=True)
@@ -187,7 +201,9 @@ def _fixed_depth(z):
     return np.int64(np.rint(np.float64(unit * np.float32(4294967040.0))))
 
 
-def make_pieces(positions: NDArray[np.float32], triangles: NDArray[np.int32], width: int, height: int) -> Pieces:
+def make_pieces(
+    positions: NDArray[np.float32], triangles: NDArray[np.int32], width: int, height: int, bits: int = SUBPIXEL_BITS
+) -> Pieces:
     """Do every thread's work up to the scan.
 
     Parameters
@@ -198,14 +214,15 @@ def make_pieces(positions: NDArray[np.float32], triangles: NDArray[np.int32], wi
         Indices, all in range.
     width, height : int
         Pixels.
+    bits : int
+        Sub-pixel bits of the snapped corners.
     """
     chunk = 4096
     kind, count = np.zeros(len(triangles), np.uint8), np.zeros(len(triangles), np.int64)
-    _classify_all(positions, triangles, width, height, chunk, kind, count)
+    _classify_all(positions, triangles, chunk, kind, count)
     first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
     total = int(first[-1])
-    pieces = Pieces(
-        kind, first, np.zeros((total, 6), np.int32), np.zeros((total, 4), np.int32), np.zeros((total, 3), np.float32)
-    )
-    _project_all(positions, triangles, width, height, chunk, pieces)
+    corner, box = np.zeros((total, 6), np.int32), np.zeros((total, 4), np.int32)
+    pieces = Pieces(kind, first, corner, box, np.zeros(total, np.int8), np.zeros((total, 3), np.float32))
+    _project_all(positions, triangles, width, height, bits, chunk, pieces)
     return pieces

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.atomics import CHUNK_BYTES, SECTOR
 from models.coalescing import transactions
-from simulator.stages.freepipe_triangle import CLIPPED, INSIDE, _fixed_depth, _start_edges
+from simulator.stages.freepipe_triangle import CLIPPED, INSIDE, SUBPIXEL_BITS, _fixed_depth, _start_edges
 
 WARP = 32
 INDEX_BYTES = 4
@@ -96,7 +96,7 @@ def _start_rows(pieces, lanes):
         if p >= 0:
             active += 1
             box = pieces.box[p]
-            _start_edges(pieces.corner[p], box[0], box[2], lanes.row[lane])
+            _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
             lanes.row_depth[lane] = pieces.depth[p, 0]
             most = max(most, np.int64(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
     return active, most

@@ -1,0 +1,69 @@
+"""FreePipe: one kernel, one thread a triangle, atomics on a frame buffer in DRAM (Liu et al. 2010)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.scenes.scene import Scene
+from simulator.stages.freepipe import BLOCK, Packing
+from simulator.stages.freepipe import freepipe as draw
+from simulator.stages.freepipe_shade import pixel_colors
+from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+
+
+def freepipe(
+    scene: Scene,
+    matrix: NDArray[np.floating],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    packing: Packing = "64",
+    early: bool = False,
+    block: int = BLOCK,
+    counting: bool = True,
+) -> Frame:
+    """Draw a mesh with one thread a triangle.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        See ``simulator.pipelines``.
+    packing : {"64", "32"}
+        One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then
+        a triangle has one colour, the mean of its corners).
+    early : bool
+        Read the pixel before the atomic.
+    block : int
+        Threads in a block.
+    counting : bool
+
+    Returns
+    -------
+    Frame
+        ``facts`` say where the picture hangs on something else than depth: ``tied_pixels``, ``mixed_pixels``.
+    """
+    mesh = triangle_mesh(scene)
+    positions = clip_positions(mesh, matrix)
+    colors = vertex_colors(mesh, matrix)
+    flat = _flat_colors(colors, mesh.triangles) if packing == "32" else None
+    frame, works, facts = draw(
+        positions, mesh.triangles, width, height, simt,
+        packing=packing, early=early, block=block, colors=flat, counting=counting,
+    )  # fmt: skip
+    if frame.colors is None:
+        image = pixel_colors(frame.ids, positions, mesh.triangles, colors)
+    else:
+        channels = np.stack([frame.colors >> np.uint32(8 * c) for c in (2, 1, 0)], axis=-1) & np.uint32(255)
+        image = (channels * (frame.ids >= 0)[..., None]).astype(np.uint8)
+    maps = {"tied_pixels": frame.tied[::-1], "mixed_pixels": frame.mixed[::-1]}
+    return Frame(image[::-1], frame.depth[::-1], list(works), frame.ids[::-1], maps, facts)
+
+
+def _flat_colors(colors: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.uint32]:
+    """Mean colour of each triangle's corners, 24 bits, red on top."""
+    safe = np.clip(triangles, 0, len(colors) - 1)  # the stage refuses what is out of range
+    mean = colors[safe, :3].mean(axis=1)
+    byte = np.clip(np.nan_to_num(mean) * 255 + 0.5, 0, 255).astype(np.uint32)
+    return byte[:, 0] << np.uint32(16) | byte[:, 1] << np.uint32(8) | byte[:, 2]

@@ -1,0 +1,40 @@
+"""The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.simt import Simt
+from simulator.frame import Frame
+from simulator.scenes.scene import Scene
+from simulator.stages.hardware import SUBPIXEL_BITS
+from simulator.stages.hardware import hardware as draw
+from simulator.stages.freepipe_shade import pixel_colors
+from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+
+
+def hardware(
+    scene: Scene,
+    matrix: NDArray[np.floating],
+    width: int,
+    height: int,
+    simt: Simt,  # noqa: ARG001 - every pipeline is called alike; fixed function has no warps
+    *,
+    cull_backfaces: bool = True,
+    bits: int = SUBPIXEL_BITS,
+) -> Frame:
+    """Draw a mesh by fixed function.
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt
+        See ``simulator.pipelines``.
+    cull_backfaces : bool
+        Leave out what is clockwise on the screen.
+    bits : int
+        Sub-pixel bits, 4 to 8.
+    """
+    mesh = triangle_mesh(scene)
+    positions = clip_positions(mesh, matrix)
+    frame, work, facts = draw(positions, mesh.triangles, width, height, cull_backfaces=cull_backfaces, bits=bits)
+    image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
+    return Frame(image[::-1], frame.depth[::-1], [work], frame.ids[::-1], facts=facts)

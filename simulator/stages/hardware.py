@@ -1,0 +1,200 @@
+"""Fixed function: what passes through the units of a hardware rasterizer, and the picture that it makes.
+
+A GPU's own pipe takes primitives in order: it fetches and transforms vertices, culls, sets up, walks the 2x2 quads of
+pixels that a triangle covers, tests depth before shading, and writes what is left. Each unit has a rate in the machine
+file, and the slowest sets the time. The counts here are exact for the coverage rule of cudaraster (section 6) at
+``bits`` sub-pixel bits (8, as hardware has) and for depth tests in input order.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.launch import Stream
+from simulator.stages.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
+from simulator.work import FixedFunctionWork
+
+SUBPIXEL_BITS = 8
+MAX_SIDE = 16384  # pixels, the limit of Direct3D 11 hardware
+STRIPS = 4  # of rows, drawn side by side
+FAR = 2**32 - 1
+QUADS, Z_TESTS, WRITES = 0, 1, 2  # columns of a strip's counts
+INDEX_BYTES, VERTEX_BYTES, DEPTH_BYTES, COLOR_BYTES = 4, 32, 4, 4
+
+
+class HardwareFrame(NamedTuple):
+    """What is left in the frame buffer; row 0 is the bottom row."""
+
+    ids: NDArray[np.int32]  # (H, W) input triangle, -1 where there is none
+    depth: NDArray[np.uint32]  # (H, W) fixed point, 2**32 - 1 where there is none
+
+
+@njit(cache=True, nogil=True)
+def _quad(pieces, p, t, edge, x, y, corner, rows, bits, ids, depth, counts):
+    """Test the four pixels of one quad, whose lower-left pixel is (x, y); draw those of the strip's rows."""
+    tests = 0
+    for j in range(2):
+        for i in range(2):
+            column, row = x + i, y + j
+            if column >= ids.shape[1] or row >= rows:
+                continue
+            inside = True
+            for k in range(3):
+                inside &= edge[k] + j * edge[3 + 2 * k] - i * edge[4 + 2 * k] >= 0
+            if not inside:
+                continue
+            tests += 1
+            right, up = np.float32((column - corner[0]) << bits), np.float32((row - corner[2]) << bits)
+            z = _fixed_depth(pieces.depth[p, 0] + pieces.depth[p, 1] * right + pieces.depth[p, 2] * up)
+            if z < depth[row, column]:
+                depth[row, column], ids[row, column] = z, t
+                counts[WRITES] += 1
+    counts[QUADS] += tests > 0
+    counts[Z_TESTS] += tests
+
+
+@njit(cache=True, nogil=True)
+def _draw_strip(pieces, first_row, end_row, bits, cull, ids, depth, counts):
+    """Draw all triangles, in order, to the rows first_row (even)..end_row-1."""
+    edge = np.empty(9, np.int64)
+    for t in range(pieces.kind.size):
+        for p in range(pieces.first[t], pieces.first[t + 1]):
+            box = pieces.box[p]
+            if box[1] < box[0] or box[3] < first_row or box[2] >= end_row or (cull and pieces.facing[p] < 0):
+                continue
+            left = np.int64(box[0]) & -2
+            for y in range(max(np.int64(box[2]) & -2, first_row), min(np.int64(box[3]) + 1, end_row), 2):
+                _start_edges(pieces.corner[p], bits, left, y, edge)
+                for x in range(left, np.int64(box[1]) + 1, 2):
+                    _quad(pieces, p, t, edge, x, y, box, end_row, bits, ids, depth, counts)
+                    for k in range(3):
+                        edge[k] -= 2 * edge[4 + 2 * k]
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _draw(pieces, strip, bits, cull, ids, depth, counts):
+    for s in prange(counts.shape[0]):
+        _draw_strip(pieces, s * strip, min((s + 1) * strip, ids.shape[0]), bits, cull, ids, depth, counts[s])
+
+
+def hardware(
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    width: int,
+    height: int,
+    *,
+    cull_backfaces: bool = True,
+    bits: int = SUBPIXEL_BITS,
+) -> tuple[HardwareFrame, FixedFunctionWork, dict[str, Any]]:
+    """Draw triangles in input order, and count what each unit sees.
+
+    Parameters
+    ----------
+    positions : ndarray, (V, 4), float32
+        Clip space.
+    triangles : ndarray, (F, 3), int32
+    width, height : int
+        Pixels.
+    cull_backfaces : bool
+        Leave out what is clockwise on the screen.
+    bits : int
+        Sub-pixel bits of the snapped corners, 4 to 8.
+
+    Returns
+    -------
+    frame : HardwareFrame
+    work : FixedFunctionWork
+        Items: ``vertices``, ``primitives`` in, ``culled`` (outside, turned away, without area or without a pixel
+        centre in their box), ``quads`` touched, ``pixels`` shaded, ``z`` tests, ``samples`` written. Depth is tested
+        before shading, so as many pixels are shaded as written.
+    facts : dict
+        ``rasterized``, ``quad_efficiency``: covered pixels by pixels of the quads touched.
+
+    Raises
+    ------
+    TilestampError
+        For a size or an option that cannot be, or an index out of range.
+    """
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise TilestampError(f"size {width}x{height}: hardware draws 1 to {MAX_SIDE} pixels in each direction")
+    if not 4 <= bits <= 8:
+        raise TilestampError(f"bits {bits}: hardware snaps to 4 to 8 sub-pixel bits")
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
+        raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
+    pieces = make_pieces(positions, triangles, width, height, bits)
+    ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.uint32)
+    strip = -(-height // (2 * STRIPS)) * 2
+    counts = np.zeros((-(-height // strip), 3), np.int64)
+    _draw(pieces, strip, bits, cull_backfaces, ids, depth, counts)
+    quads, tests, writes = (int(n) for n in counts.sum(axis=0))
+    work, rasterized = _work(positions, triangles, pieces, cull_backfaces, quads, tests, writes)
+    facts = {"rasterized": rasterized, "quad_efficiency": tests / max(4 * quads, 1)}
+    return HardwareFrame(ids, depth), work, facts
+
+
+def hardware_grids(
+    grids: NDArray[np.float32], width: int, height: int, *, bits: int = SUBPIXEL_BITS
+) -> tuple[HardwareFrame, FixedFunctionWork, dict[str, Any]]:
+    """Draw micropolygon grids, each quad as two triangles: the hybrid path.
+
+    Parameters
+    ----------
+    grids : ndarray, (G, R, C, 4), float32
+        Clip positions of grids of R x C vertices.
+    width, height : int
+        Pixels.
+    bits : int
+        Sub-pixel bits.
+
+    Returns
+    -------
+    frame, work, facts
+        As ``hardware``; ids count quads, in the order of grids, rows, columns.
+    """
+    count, rows, columns = grids.shape[:3]
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    pair = np.stack([np.stack([a, b, c], axis=-1), np.stack([c, b, d], axis=-1)], axis=2).reshape(-1, 3)
+    triangles = (pair[None] + (np.arange(count) * rows * columns)[:, None, None]).reshape(-1, 3).astype(np.int32)
+    positions = np.ascontiguousarray(grids.reshape(-1, 4))
+    frame, work, facts = hardware(positions, triangles, width, height, cull_backfaces=False, bits=bits)
+    return frame._replace(ids=np.where(frame.ids >= 0, frame.ids // 2, -1).astype(np.int32)), work, facts
+
+
+def _work(
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    pieces: Pieces,
+    cull: bool,
+    quads: int,
+    tests: int,
+    writes: int,
+) -> tuple[FixedFunctionWork, int]:
+    """Items of the units and the buffers that they touch; returns the triangles that reach the rasterizer too."""
+    drawn = (pieces.box[:, 1] >= pieces.box[:, 0]) & (pieces.box[:, 3] >= pieces.box[:, 2])
+    if cull:
+        drawn &= pieces.facing > 0
+    parts = np.concatenate([[0], np.cumsum(drawn)])
+    rasterized = int(np.count_nonzero(np.diff(parts[pieces.first])))
+    items = {
+        "vertices": len(positions),
+        "primitives": len(triangles),
+        "culled": len(triangles) - rasterized,
+        "quads": quads,
+        "pixels": writes,
+        "z": tests,
+        "samples": writes,
+    }
+    indices, vertices = triangles.size * INDEX_BYTES, len(positions) * VERTEX_BYTES
+    streams = (
+        Stream("triangles", "load", indices, indices),
+        Stream("positions", "load", vertices, vertices),
+        Stream("depth", "load", tests * DEPTH_BYTES, tests * DEPTH_BYTES),
+        Stream("depth", "store", writes * DEPTH_BYTES, writes * DEPTH_BYTES),
+        Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
+    )
+    events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
+    return FixedFunctionWork("hardware", "draw", items, events, streams), rasterized
