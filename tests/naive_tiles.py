@@ -45,7 +45,7 @@ def naive_atomics(words, merge):
 
 
 def naive_conflicts(boxes, tile, columns, rows, slots, simt, padding=1, aggregate=False):
-    """Sums over all instructions: a dictionary by event name."""
+    """Give sums over all instructions: a dictionary by event name."""
     ranges = naive_ranges(boxes, tile, columns, rows, slots)
     group = 16 if simt.coalescing == Coalescing.HALF_WARP_SEGMENTS else simt.warp
     names = ("ATOMIC_LANES", "ATOMIC_REQUESTS", "ATOMIC_CONFLICTS", "ATOMIC_DEPTH", "LOCK_DEPTH", "ATOMIC_SECTORS")
@@ -108,7 +108,7 @@ def naive_sample(quad, colors, x, y):
     return z, packed
 
 
-def naive_raster(vertices, lists, tile, columns, width, height, side, warp, box_tests):  # noqa: PLR0914 - a CUDA kernel
+def naive_raster(vertices, lists, tile, columns, width, height, side, warp, box_tests):
     """Image, depth and events by block, thread by thread."""
     bits = vertices.view(np.uint32)[:, :, 3]
     image = np.zeros((height, width, 3), np.uint8)

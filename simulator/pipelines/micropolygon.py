@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.frame import Frame
+from simulator.pipelines._micropolygon_hybrid import draw_grids
 from simulator.scenes.scene import Scene
 from simulator.stages.bound_and_split import BoundRule, SubPatches, bound_and_split
 from simulator.stages.bucket_count import bucket_count
@@ -84,14 +85,14 @@ def micropolygon(
     """
     if scene.patches is None:
         raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
-    if hybrid:
-        raise TilestampError("the hybrid needs the hardware stage, which is not connected yet")
     points = scene.patches.points
     tiles = screen_tiles(width, height, tile, bound)
     subpatches, split = bound_and_split(
         points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting
     )
     grids, diced = dice(points, subpatches, matrix, width, height, simt, texture=texture, counting=counting)
+    if hybrid:
+        return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
     start, scanned = bucket_scan(count, simt, counting=counting)
     lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
@@ -111,7 +112,7 @@ def micropolygon(
     )
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
-    return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, lists))
+    return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, len(lists)))
 
 
 def _maps(
@@ -132,11 +133,11 @@ def _maps(
     }
 
 
-def _facts(subpatches: SubPatches, lists: NDArray[np.uint32]) -> dict[str, Any]:
-    """What a report may say besides."""
+def _facts(subpatches: SubPatches, written: int) -> dict[str, Any]:
+    """Tell what a report may say besides."""
     return {
         "subpatches": len(subpatches.patch),
-        "patches_written": len(lists),
+        "patches_written": written,
         "queue_passes": subpatches.passes.tolist(),
         "given_up": int(subpatches.passes[:, -1].sum()),
     }

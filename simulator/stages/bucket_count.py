@@ -3,10 +3,10 @@
 COUNT is set to zero. Then one thread a patch adds one to the counter of each tile that the patch overlaps, by
 ``atomicAdd``; the value returned is the patch's place in that tile's list and is kept in IDX.
 
-We let the warps run in the order of the patch queue, one after the other. A real machine is free to mix them; the picture
-depends on it only where two samples have the same depth. Conflicts do not depend on it: they are counted warp by warp,
-slot by slot, on the real tiles. Options that the paper lacks: counters some words apart, and one atomic for all lanes of
-a warp that want the same tile.
+We let the warps run in the order of the patch queue, one after the other. A real machine is free to mix them; the
+picture depends on it only where two samples have the same depth. Conflicts do not depend on it: they are counted warp
+by warp, slot by slot, on the real tiles. Options that the paper lacks: counters some words apart, and one atomic for
+all lanes of a warp that want the same tile.
 """
 
 from enum import IntEnum
@@ -20,7 +20,7 @@ from models.coalescing import contiguous, transactions
 from models.launch import Stream
 from models.simt import Simt
 from simulator.stages.bucket_conflicts import atomic_rule, keep_leaders, list_wanted, scratch, send_requests
-from simulator.stages.tile_range import Tiles, slot_tiles, tile_range
+from simulator.stages.tile_range import Tiles, slot_tiles
 from simulator.work import Work
 
 BLOCK = 256  # threads: one a patch

@@ -1,8 +1,9 @@
-"""Parallel bucketing, the scan between its halves: START is the prefix sum of COUNT (Eisenacher & Loop 2010, section 3.2).
+"""Parallel bucketing, the scan between its halves (Eisenacher & Loop 2010, section 3.2).
 
-The paper uses the parallel scan of CUDPP (Harris et al. 2008): each block sums 1024 counters, four a thread, by a tree in
-shared memory that is padded against bank conflicts; the sums of the blocks are scanned in the same way, level by level,
-and added back. Its launches and traffic are counted from that shape; the sum itself is NumPy's.
+START is the prefix sum of COUNT. The paper uses the parallel scan of CUDPP (Harris et al. 2008): each block sums 1024
+counters, four a thread, by a tree in shared memory that is padded against bank conflicts; the sums of the blocks are
+scanned in the same way, level by level, and added back. Its launches and traffic are counted from that shape; the sum
+itself is NumPy's.
 """
 
 from enum import IntEnum
@@ -135,7 +136,7 @@ def _scan_work(level: int, size: int, simt: Simt) -> Work:
 
 
 def _add_work(level: int, size: int, simt: Simt) -> Work:
-    """Adds the scanned sum of each block to its elements."""
+    """Add the scanned sum of each block to its elements."""
     table = _blocks(size, simt)
     table[:, _E.BARRIER] = table[:, _E.WARPS]
     target = _buffers(level)[1]

@@ -39,7 +39,7 @@ _E = BucketWriteEvent
 
 @njit(cache=True, nogil=True)
 def _write(boxes, tiles, start, idx, lists):
-    """LISTS."""
+    """Fill LISTS."""
     for p in range(boxes.shape[0]):
         x0, y0, x1, y1 = tile_range(boxes[p], tiles)
         for y in range(y0, y1 + 1):

@@ -111,11 +111,11 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     """Count what is alike in all blocks."""
     lanes = np.arange(VERTICES, dtype=np.int64) * VECTOR_BYTES
     edges = np.zeros((EDGE_ALIGNMENTS, 2), np.int64)
-    for grid, row in enumerate(edges):
+    for grid in range(EDGE_ALIGNMENTS):
         base = grid * EDGE_VECTORS * VECTOR_BYTES
-        row += transactions(lanes + base, VERTICES, VECTOR_BYTES, shape.coalescing)
+        edges[grid] += transactions(lanes + base, VERTICES, VECTOR_BYTES, shape.coalescing)
         base += VERTICES * VECTOR_BYTES
-        row += transactions(lanes + base, EDGE_VECTORS - VERTICES, VECTOR_BYTES, shape.coalescing)
+        edges[grid] += transactions(lanes + base, EDGE_VECTORS - VERTICES, VECTOR_BYTES, shape.coalescing)
     full = min(shape.warp, shape.tile**2)
     passes = 0  # wide accesses go word by word on 1.x, in groups that fill the banks once later
     if shape.coalescing == _HALF_WARP:

@@ -49,8 +49,8 @@ def quad_box(vertices, grid, v):
     """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``."""
     ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, v + 1, 0], vertices[grid, v + 5, 0], vertices[grid, v + 4, 0]
     ay, by, cy, dy = vertices[grid, v, 1], vertices[grid, v + 1, 1], vertices[grid, v + 5, 1], vertices[grid, v + 4, 1]
-    x0, x1 = min(min(ax, bx), min(cx, dx)), max(max(ax, bx), max(cx, dx))
-    y0, y1 = min(min(ay, by), min(cy, dy)), max(max(ay, by), max(cy, dy))
+    x0, x1 = min(ax, bx, cx, dx), max(ax, bx, cx, dx)
+    y0, y1 = min(ay, by, cy, dy), max(ay, by, cy, dy)
     return x0, y0, x1, y1
 
 

@@ -1,0 +1,51 @@
+"""Speed of the micropolygon pipeline, by ``pytest tests/benchmarks --benchmark-only``: reported, never asserted."""
+
+import os
+from functools import cache
+
+import pytest
+
+from models.errors import TilestampError
+from models.simt import AtomicMerge, Coalescing, Simt
+from simulator.pipelines.micropolygon import micropolygon
+from simulator.scenes import load_scene, read_camera
+from simulator.stages.bound_and_split import bound_and_split
+from simulator.stages.bucket_count import bucket_count
+from simulator.stages.dice import dice
+from simulator.stages.tile_range import screen_tiles
+
+GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
+SIZE = (1600, 1200)
+SCENE = os.environ.get("TILESTAMP_BENCHMARK_SCENE", "killeroo")
+
+
+@cache
+def scene_and_matrix():
+    try:
+        scene = load_scene(SCENE)
+    except TilestampError as error:
+        pytest.skip(str(error))
+    return scene, read_camera("default", scene).matrix(*SIZE)
+
+
+@cache
+def grids():
+    scene, matrix = scene_and_matrix()
+    subpatches, _ = bound_and_split(scene.patches.points, matrix, *SIZE, 4, GT200, counting=False)
+    return dice(scene.patches.points, subpatches, matrix, *SIZE, GT200, counting=False)[0]
+
+
+@pytest.mark.parametrize("tile", [4, 8, 32])
+def test_bucket_count_with_every_conflict(benchmark, tile):
+    boxes, tiles = grids().boxes, screen_tiles(*SIZE, tile, 4)
+    benchmark.extra_info["subpatches"] = len(boxes)
+    benchmark.pedantic(bucket_count, (boxes, tiles, GT200), rounds=10, warmup_rounds=1)
+
+
+@pytest.mark.parametrize("counting", [True, False])
+@pytest.mark.parametrize("spp", [1, 4])
+def test_frame(benchmark, spp, counting):
+    scene, matrix = scene_and_matrix()
+    options = {"spp": spp, "counting": counting}
+    frame = benchmark.pedantic(micropolygon, (scene, matrix, *SIZE, GT200), options, rounds=5, warmup_rounds=1)
+    benchmark.extra_info.update({key: frame.facts[key] for key in ("subpatches", "patches_written")})
