@@ -24,7 +24,7 @@ def halves(row):
 
 
 def quarters(net):
-    """The four children of a net of 16 points, u first."""
+    """Give the four children of a net of 16 points, u first."""
     rows = [halves(net[4 * y : 4 * y + 4]) for y in range(4)]
     children = {}
     for i in range(2):
@@ -64,7 +64,7 @@ def decide(net, width, height, bound, whole_pixels):
 
 
 def bound_and_split(points, matrix, width, height, bound, whole_pixels=False, max_depth=14):
-    """The final queue as (patch, level, i, j), and [length, culled, kept, split, given up] of each pass."""
+    """Give the final queue as (patch, level, i, j), and [length, culled, kept, split, given up] of each pass."""
     queue = [(p, 0, 0, 0, to_screen(net, matrix, width, height)) for p, net in enumerate(points)]
     passes = []
     while True:

@@ -27,7 +27,7 @@ def squares(*entries):
 
 
 def flat(height=0.0, size=1.0):
-    """A flat square patch with its edges along x and y, facing up."""
+    """Make a flat square patch with its edges along x and y, facing up."""
     y, x = np.divmod(np.arange(16), 4)
     columns = [(x / 3 - 0.5) * size, (y / 3 - 0.5) * size, 0 * x + height, 0 * x + 1]
     return np.stack(columns, axis=1).astype(np.float32)[None]
@@ -76,7 +76,7 @@ def test_a_rational_quarter_circle_is_round():
     h = math.sqrt(0.5)
     p0, p1, p2 = np.array([1, 0, 0, 1.0]), np.array([h, h, 0, h]), np.array([0, 1, 0, 1.0])
     arc = [p0, (p0 + 2 * p1) / 3, (2 * p1 + p2) / 3, p2]
-    points = np.array([[q + [0, 0, row * q[3] / 3, 0] for row in range(4) for q in arc]], np.float32)
+    points = np.array([[np.add(q, [0, 0, row * q[3] / 3, 0]) for row in range(4) for q in arc]], np.float32)
     grids, _ = dice(points, squares((0, 0, 0, 0), (0, 1, 1, 1)), np.eye(4), 2, 2, GTX280)
     x, y = grids.vertices[..., 0] - 1, 1 - grids.vertices[..., 1]
     assert np.abs(np.hypot(x, y) - 1).max() < 1e-6

@@ -1,8 +1,9 @@
 """Named views of the models, chosen to match the counts of Eisenacher & Loop 2010.
 
-The paper gives its views only as pictures, which we do not have. So each is a front three-quarter view, 45 degrees high,
-aimed at the middle of the model's box, in which the whole model lies inside both 1600x1200 and 512x512; one number a
-model is **fitted**: the distance of the eye, on the patches rasterized at 1600x1200 with a bound of 4 (Table 2).
+The paper gives its views only as pictures, which we do not have. So each is a front three-quarter view, 45 degrees
+high, aimed at the middle of the model's box, in which the whole model lies inside both 1600x1200 and 512x512; one
+number a model is **fitted**: the distance of the eye, on the patches rasterized at 1600x1200 with a bound of 4
+(Table 2).
 
 Everything else is a prediction, with ``bound_rule="pixel_extent"`` (``simulator/stages/bound_and_split.py``); in
 brackets with ``control_points``, each with a distance fitted for it. Error of the patches rasterized, 8x8 tiles:
@@ -18,12 +19,12 @@ killeroo  445 k       -3.4 % (-12.0)    -3.6 % (-2.8)     -4.9 % (-11.8)
 Killeroo at 1600x1200 and BB 4: 269 k sub-patches (paper 270 k; 282 k with ``control_points``) and 2.46, 1.65, 1.31,
 1.15 tiles a patch at tiles of 4, 8, 16, 32 (paper 2.45, 1.65, 1.30, 1.14; 2.29, 1.58, 1.27, 1.14).
 
-Also tried, for all models alike: less than a whole-pixel extent (-24 % at BB 8), a bound one pixel larger (+8 %), a box
-of the 16 vertices instead of the control points (as with control points, within 0.3 %), the diagonal of the box (-15 %),
-tiles of boxes rounded out to whole pixels (-14 %, and 3.1 tiles a patch at 4). A bound half a pixel larger does as well
-as ``pixel_extent``, but has no reason. Back faces were not culled: the visible half alone would have to fill more of
-the screen than the models can. The cells at 512x512 come out 2 to 5 % low under every rule and from every side that
-was tried: there the paper's pictures seem a little larger than a plain change of size makes them.
+Also tried, for all models alike: less than a whole-pixel extent (-24 % at BB 8), a bound one pixel larger (+8 %), a
+box of the 16 vertices instead of the control points (the same within 0.5 %), the diagonal of the box (-15 %), tiles of
+boxes rounded out to whole pixels (-14 %, and 3.1 tiles a patch at 4). A bound half a pixel larger does as well as
+``pixel_extent``, but has no reason. Back faces were not culled: the visible half alone would have to fill more of the
+screen than the models can. The cells at 512x512 come out 2 to 5 % low under nearly every rule and from nearly every
+side that was tried: there the paper's pictures seem a little larger than a plain change of size makes them.
 """
 
 from collections.abc import Sequence

@@ -16,7 +16,7 @@ all models and never for a cell:
 """
 
 from enum import IntEnum
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -65,7 +65,7 @@ _SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by pa
 
 
 @njit(cache=True, nogil=True)
-def _is_small(x0, y0, x1, y1, bound, whole_pixels):
+def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any) -> Any:
     """Whether a box satisfies the bound."""
     if whole_pixels:
         return np.floor(x1) - np.floor(x0) <= bound and np.floor(y1) - np.floor(y0) <= bound
@@ -73,7 +73,7 @@ def _is_small(x0, y0, x1, y1, bound, whole_pixels):
 
 
 @njit(cache=True, nogil=True)
-def _examine(net, width, height, bound, whole_pixels):
+def _examine(net: Any, width: Any, height: Any, bound: Any, whole_pixels: Any) -> Any:
     """Path of a sub-patch with the control points ``net`` (3, 16): x w, y w in pixels, and w."""
     front = behind = left = right = above = below = 0
     for k in range(16):
@@ -99,7 +99,9 @@ def _examine(net, width, height, bound, whole_pixels):
 
 
 @njit(cache=True, nogil=True)
-def _oracle_block(start, stop, screen, queue, path, size, bound, whole_pixels, max_depth):
+def _oracle_block(
+    start: Any, stop: Any, screen: Any, queue: Any, path: Any, size: Any, bound: Any, whole_pixels: Any, max_depth: Any
+) -> Any:
     """Examine the sub-patches start..stop-1; one that was kept before is kept again."""
     by_u = np.empty((4, 4), np.float32)
     by_v = np.empty((4, 4), np.float32)
@@ -117,14 +119,14 @@ def _oracle_block(start, stop, screen, queue, path, size, bound, whole_pixels, m
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _oracle(screen, queue, path, size, bound, whole_pixels, max_depth):
+def _oracle(screen: Any, queue: Any, path: Any, size: Any, bound: Any, whole_pixels: Any, max_depth: Any) -> Any:
     for block in prange(-(-path.shape[0] // BLOCK)):
         stop = min((block + 1) * BLOCK, path.shape[0])
         _oracle_block(block * BLOCK, stop, screen, queue, path, size, bound, whole_pixels, max_depth)
 
 
 @njit(cache=True, nogil=True)
-def _subdivide_block(start, stop, queue, path, places, target, target_path):
+def _subdivide_block(start: Any, stop: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
     """Move what is kept, and write the four children of what is split, u first."""
     for k in range(start, stop):
         place = places[k]
@@ -143,7 +145,7 @@ def _subdivide_block(start, stop, queue, path, places, target, target_path):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _subdivide(queue, path, places, target, target_path):
+def _subdivide(queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
     for block in prange(-(-path.shape[0] // BLOCK)):
         stop = min((block + 1) * BLOCK, path.shape[0])
         _subdivide_block(block * BLOCK, stop, queue, path, places, target, target_path)

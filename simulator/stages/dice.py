@@ -9,7 +9,7 @@ fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs
 """
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -57,13 +57,13 @@ _E = DiceEvent
 
 
 @njit(cache=True, nogil=True)
-def _set_tables(grid, first_u, first_v, side):
+def _set_tables(grid: Any, first_u: Any, first_v: Any, side: Any) -> Any:
     basis(first_u, side, grid.by_u, grid.slope_u)
     basis(first_v, side, grid.by_v, grid.slope_v)
 
 
 @njit(cache=True, nogil=True)
-def _evaluate(grid, net):
+def _evaluate(grid: Any, net: Any) -> Any:
     """Points, tangents and normals of a grid from the control net (D, 16) of its patch; vertices without a normal."""
     evaluate(
         net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
@@ -72,7 +72,7 @@ def _evaluate(grid, net):
 
 
 @njit(cache=True, nogil=True)
-def _borrow_normals(grid, net, first_u, first_v, side, spare):
+def _borrow_normals(grid: Any, net: Any, first_u: Any, first_v: Any, side: Any, spare: Any) -> Any:
     """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
     for k in range(VERTICES):
         if grid.rows[MATT + k] > 0:
@@ -87,7 +87,7 @@ def _borrow_normals(grid, net, first_u, first_v, side, spare):
 
 
 @njit(cache=True, nogil=True)
-def _set_point_tables(grid, u, v):
+def _set_point_tables(grid: Any, u: Any, v: Any) -> Any:
     """Tables of a grid of which only the first vertex counts, at (u, v)."""
     for table, slopes, a in ((grid.by_u, grid.slope_u, u), (grid.by_v, grid.slope_v, v)):
         A = np.float32(1) - a
@@ -99,7 +99,7 @@ def _set_point_tables(grid, u, v):
 
 
 @njit(cache=True, nogil=True)
-def _store_grid(screen, vertices, box):
+def _store_grid(screen: Any, vertices: Any, box: Any) -> Any:
     """Project 16 vertices, and bound them."""
     x0 = y0 = np.float32(np.inf)
     x1 = y1 = np.float32(-np.inf)
@@ -113,7 +113,18 @@ def _store_grid(screen, vertices, box):
 
 
 @njit(cache=True, nogil=True)
-def _dice_chunk(start, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes):
+def _dice_chunk(
+    start: Any,
+    stop: Any,
+    subpatches: Any,
+    nets: Any,
+    screen: Any,
+    light: Any,
+    texture: Any,
+    vertices: Any,
+    colors: Any,
+    boxes: Any,
+) -> Any:
     """Dice the sub-patches start..stop-1."""
     grid = new_grid()
     spare = new_grid()
@@ -129,7 +140,9 @@ def _dice_chunk(start, stop, subpatches, nets, screen, light, texture, vertices,
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _dice(subpatches, nets, screen, light, texture, vertices, colors, boxes):
+def _dice(
+    subpatches: Any, nets: Any, screen: Any, light: Any, texture: Any, vertices: Any, colors: Any, boxes: Any
+) -> Any:
     for chunk in prange(-(-boxes.shape[0] // CHUNK)):
         stop = min((chunk + 1) * CHUNK, boxes.shape[0])
         _dice_chunk(chunk * CHUNK, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes)

@@ -4,7 +4,7 @@ The lamp hangs above the viewer's left shoulder and is infinitely far away; surf
 "Phong shaded" and "textured" and no more: reflectances and lamp are ours.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def new_grid():
+def new_grid() -> Any:
     """Scratch for grids; w = 1 until a patch with weights writes it."""
     rows = np.zeros(ROWS, np.float32)
     rows[POINT + 48 : POINT + 64] = 1
@@ -101,7 +101,7 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
 
 
 @njit(cache=True, nogil=True)
-def set_normals(s):
+def set_normals(s: Any) -> Any:
     """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
     missing = 0
     for k in range(16):
@@ -119,7 +119,7 @@ def set_normals(s):
 
 
 @njit(cache=True, nogil=True)
-def _set_light(s, lx, ly, lz, ex, ey, ez, ew):
+def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> Any:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
     for k in range(16):
@@ -139,12 +139,12 @@ def _set_light(s, lx, ly, lz, ex, ey, ez, ew):
         mirrored *= mirrored
         mirrored *= mirrored
         mirrored *= mirrored
-        s[MATT + k] = AMBIENT + DIFFUSE * (lit if lit > _ZERO else _ZERO)
+        s[MATT + k] = AMBIENT + DIFFUSE * max(lit, _ZERO)
         s[GLOSS + k] = SPECULAR * mirrored
 
 
 @njit(cache=True, nogil=True)
-def _set_checker(s, squares):
+def _set_checker(s: Any, squares: Any) -> Any:
     """Reflectances of a solid checker."""
     for k in range(16):
         scale = squares / s[POINT + 48 + k]
@@ -157,7 +157,7 @@ def _set_checker(s, squares):
 
 
 @njit(cache=True, nogil=True)
-def _set_texels(s, texture, first_u, first_v, side):
+def _set_texels(s: Any, texture: Any, first_u: Any, first_v: Any, side: Any) -> Any:
     """Reflectances from the texels at (u, v) of the patch, v down the rows."""
     for k in range(16):
         u = np.float32(3 * first_u + (k & 3)) * side / _THREE
@@ -169,15 +169,15 @@ def _set_texels(s, texture, first_u, first_v, side):
 
 
 @njit(cache=True, nogil=True)
-def _set_colors(s):
+def _set_colors(s: Any) -> Any:
     """Light the reflectances: levels from 0 to 255."""
     for k in range(48):
         level = s[COLOR + k] * s[MATT + (k & 15)] + s[GLOSS + (k & 15)]
-        s[COLOR + k] = (level if level < _ONE else _ONE) * _BYTE + _HALF
+        s[COLOR + k] = min(level, _ONE) * _BYTE + _HALF
 
 
 @njit(cache=True, nogil=True)
-def shade(grid, light, texture, first_u, first_v, side, vertices):
+def shade(grid: Any, light: Any, texture: Any, first_u: Any, first_v: Any, side: Any, vertices: Any) -> Any:
     """Write the colours of a grid with normals, RGBA8 with red lowest, to the fourth word of ``vertices`` (16, 4)."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
     _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])

@@ -78,7 +78,7 @@ _T = TransformEvent
 
 
 @njit(cache=True, nogil=True)
-def _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, row):
+def _count_oracle_warp(first: Any, lanes: Any, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any) -> Any:
     """Events of one warp of the oracle."""
     boxes = 0
     for lane in range(lanes):
@@ -109,7 +109,9 @@ def _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, row):
 
 
 @njit(cache=True, nogil=True)
-def _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, row):
+def _count_subdivide_warp(
+    first: Any, lanes: Any, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
+) -> Any:
     """Events of one warp of the subdivision: one store of what is kept, then four of children."""
     kept = split = 0
     for lane in range(lanes):
@@ -141,7 +143,7 @@ def _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, row
 
 
 @njit(cache=True, nogil=True)
-def _count_block(block, patch, path, places, warp, coalescing, table):
+def _count_block(block: Any, patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any) -> Any:
     """Events of one block; of the subdivision where ``places`` are given."""
     addresses = np.empty(warp, np.int64)
     end = min((block + 1) * BLOCK, path.shape[0])
@@ -154,7 +156,7 @@ def _count_block(block, patch, path, places, warp, coalescing, table):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _count_blocks(patch, path, places, warp, coalescing, table):
+def _count_blocks(patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any) -> Any:
     for block in prange(table.shape[0]):
         _count_block(block, patch, path, places, warp, coalescing, table)
 
