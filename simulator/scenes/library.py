@@ -179,6 +179,8 @@ def _read(name: str, path: Path, kind: Kind) -> Scene:
         scene = clip_space_scene(read_clip_space(path), name)
     elif suffix in GLTF_SUFFIXES:
         scene = Scene(name, mesh=checked_mesh(read_gltf(path), path))
+    elif suffix in (".glb", ".gltf"):
+        scene = Scene(name, mesh=read_gltf(path))
     else:
         scene = Scene(name, mesh=read_mesh(path))
     return replace(with_mesh(scene), patches=None) if kind == "mesh" else scene

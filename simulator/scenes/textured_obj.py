@@ -14,6 +14,13 @@ from simulator.scenes.scene import Mesh
 from simulator.scenes.textured_mesh import vertex_normals
 
 
+def is_textured(path: Path) -> bool:
+    """Whether a material library of an OBJ file names a texture."""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    libraries = (path.parent / line.split(maxsplit=1)[1].strip() for line in lines if line.startswith("mtllib "))
+    return any("map_Kd" in library.read_text(errors="replace") for library in libraries if library.is_file())
+
+
 def read_textured_obj(path: str | Path) -> Mesh:
     """Read an OBJ file with its texture coordinates, normals and materials.
 

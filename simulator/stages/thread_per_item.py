@@ -20,6 +20,7 @@ class ThreadEvent(IntEnum):
     STORE_TRANSACTIONS = 3
     LOAD_BYTES = 4
     STORE_BYTES = 5
+    BLOCKS = 6  # 1: what a dependent chain is priced on
 
 
 class Access(NamedTuple):
@@ -53,6 +54,8 @@ def thread_per_item(
 ) -> Work:
     """Make the work table of a kernel whose thread i handles item i.
 
+    The streams hold each record once: further words of a segment that a warp has just touched come from its L1 or L2.
+
     Parameters
     ----------
     stage, kernel : str
@@ -74,13 +77,16 @@ def thread_per_item(
     table = np.zeros((blocks, len(ThreadEvent)), np.int64)
     table[:, ThreadEvent.WARPS] = warps
     table[:, ThreadEvent.WARP_LANES] = lanes
+    table[:, ThreadEvent.BLOCKS] = 1
     streams = []
     for op, accesses in (("load", loads), ("store", stores)):
         for access in accesses:
             count, size = record_transactions(access, simt)
             table[:, ThreadEvent[f"{op.upper()}_TRANSACTIONS"]] += warps * count
             table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
-            streams.append(Stream(access.buffer, op, int(warps.sum()) * size, items * access.stride))  # type: ignore[arg-type]
+            footprint = items * access.stride
+            moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
+            streams.append(Stream(access.buffer, op, moved, footprint))  # type: ignore[arg-type]
     return Work(stage, kernel, ThreadEvent, table, blocks, block, streams=tuple(streams))
 
 

@@ -5,7 +5,7 @@ from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work
 
-BLOCK = 64  # threads, 8x8
+BLOCK = 256  # threads of the runtime's memset (assumed)
 
 
 def clear(width: int, height: int, tiles: int, simt: Simt) -> list[Work]:
@@ -25,9 +25,9 @@ def clear(width: int, height: int, tiles: int, simt: Simt) -> list[Work]:
         One for each buffer.
     """
     pixels = width * height
-    fragments = Access("fragments", FRAGMENT_BYTES, FRAGMENT_BYTES // 4)
+    words = pixels * FRAGMENT_BYTES // 4
     works = [
-        thread_per_item("clear", "clear_fragments", pixels, BLOCK, simt, stores=(fragments,)),
+        thread_per_item("clear", "clear_fragments", words, BLOCK, simt, stores=(Access("fragments", 4, 1),)),
         thread_per_item("clear", "clear_depth", pixels, BLOCK, simt, stores=(Access("depth", 4, 1),)),
     ]
     if tiles:

@@ -274,9 +274,9 @@ def per_primitive_raster(
     _add_traffic(events, simt)
     total = events.sum(axis=0)
     streams = (
-        Stream("primitives", "load", int(total[PerPrimitiveEvent.LOAD_BYTES]), len(drawable) * PRIMITIVE_BYTES),
+        Stream("primitives", "load", len(drawable) * PRIMITIVE_BYTES, len(drawable) * PRIMITIVE_BYTES),
         Stream("depth", "atomic", 32 * int(total[PerPrimitiveEvent.ATOMIC_REQUESTS]), 4 * width * height),
-        Stream("fragments", "store", int(total[PerPrimitiveEvent.STORE_BYTES]), FRAGMENT_BYTES * width * height),
+        Stream("fragments", "store", 64 * int(total[PerPrimitiveEvent.WRITE_LANES]), FRAGMENT_BYTES * width * height),
     )
     work = Work(
         "per_primitive_raster", "per_primitive_raster", PerPrimitiveEvent, events, blocks, BLOCK,

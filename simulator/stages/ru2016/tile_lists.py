@@ -275,7 +275,7 @@ def _streams(events: NDArray[np.int64], count: int, tiles: int) -> tuple[Stream,
     total = events.sum(axis=0)
     appended = int(total[TileListEvent.APPEND_LANES])
     return (
-        Stream("primitives", "load", int(total[TileListEvent.LOAD_BYTES]), count * PRIMITIVE_BYTES),
+        Stream("primitives", "load", 96 * int(total[TileListEvent.WARP_LANES]), count * PRIMITIVE_BYTES),
         Stream("tile_lists", "store", int(total[TileListEvent.STORE_BYTES]), 4 * appended),
         Stream("tile_counters", "atomic", 32 * int(total[TileListEvent.ATOMIC_REQUESTS]), 4 * tiles),
     )

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from models.coalescing import transactions
 from models.launch import Stream
 from models.simt import Simt
 from simulator.stages.ru2016.tile_lists import TileLists
@@ -164,20 +165,22 @@ def tiled_raster(
     drawn = len(np.unique(lists.entries))
     streams = (
         Stream("tile_lists", "load", 4 * len(lists.entries), 4 * len(lists.entries)),
-        Stream("primitives", "load", int(total[TiledRasterEvent.LOAD_BYTES]), drawn * PRIMITIVE_BYTES),
-        Stream("fragments", "store", int(total[TiledRasterEvent.STORE_BYTES]), width * height * (FRAGMENT_BYTES + 4)),
+        Stream("primitives", "load", 224 * int(total[TiledRasterEvent.TEST_WARPS]), drawn * PRIMITIVE_BYTES),
+        Stream("fragments", "store", width * height * (FRAGMENT_BYTES + 4), width * height * (FRAGMENT_BYTES + 4)),
     )
     work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
     return visible, work
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
-    """All lanes read the same words, so an entry's primitive costs its segments once a warp; fragments lie 60 bytes apart."""
+    """All lanes read the same words: one transaction for each word; fragments are stored word by word, 60 bytes apart."""
     segment = 128 if simt.coalescing == 2 else 32
-    reads = events[:, TiledRasterEvent.TEST_WARPS] * (-(-PRIMITIVE_BYTES // segment) + 1)  # the primitive, its number
-    rows = min(simt.warp, tile * tile) // min(simt.warp, tile)  # rows of the tile that a warp covers
-    writes = events[:, TiledRasterEvent.WARPS] * rows * (-(-tile * FRAGMENT_BYTES // segment) + 1)
+    reads = events[:, TiledRasterEvent.TEST_WARPS] * (PRIMITIVE_BYTES // 4 + 1)  # the primitive, and its number
+    lanes = np.where(np.arange(simt.warp) < tile * tile, np.arange(simt.warp), -1)
+    addresses = np.where(lanes >= 0, (lanes // tile * 800 + lanes % tile) * FRAGMENT_BYTES, -1)
+    count, size = transactions(addresses, simt.warp, 4, int(simt.coalescing))
+    writes = events[:, TiledRasterEvent.WARPS] * (FRAGMENT_BYTES // 4 + 1)
     events[:, TiledRasterEvent.LOAD_TRANSACTIONS] = reads
     events[:, TiledRasterEvent.LOAD_BYTES] = reads * segment
-    events[:, TiledRasterEvent.STORE_TRANSACTIONS] = writes
-    events[:, TiledRasterEvent.STORE_BYTES] = writes * segment
+    events[:, TiledRasterEvent.STORE_TRANSACTIONS] = writes * count
+    events[:, TiledRasterEvent.STORE_BYTES] = writes * size

@@ -58,6 +58,7 @@ class CoarseRasterizerEvent(IntEnum):
     LOAD_BYTES = 18
     STORE_TRANSACTIONS = 19
     STORE_BYTES = 20
+    SUB_QUEUES = 21  # of the binning blocks, read one after another
 
 
 class TileQueues(NamedTuple):
@@ -234,10 +235,10 @@ def coarse_rasterizer(
     firsts = starts[:-1].reshape(by_row.shape).swapaxes(1, 2).reshape(columns * rows, tiles)
     entries = np.empty(int(starts[-1]), np.int32)
     _coarse_rasterizer(*shape, counts, entries, np.ascontiguousarray(firsts), np.zeros_like(events))
-    _add_costs(events, counts, simt)
+    _add_costs(events, counts, -(-len(data.ids) // BLOCK), simt)
     total = events.sum(axis=0)
     streams = (
-        Stream("setup", "load", int(total[CoarseRasterizerEvent.LOAD_BYTES]), len(data.ids) * SETUP_BYTES),
+        Stream("setup", "load", 160 * int(total[CoarseRasterizerEvent.WARP_LANES]), len(data.ids) * SETUP_BYTES),
         Stream("tile_queue", "store", int(total[CoarseRasterizerEvent.STORE_BYTES]), 4 * len(entries)),
     )
     kernel = "CoarseRasterizer" if unrolled else "CoarseRasterizer_before"
@@ -246,7 +247,7 @@ def coarse_rasterizer(
     )
 
 
-def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], simt: Simt) -> None:
+def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], sub_queues: int, simt: Simt) -> None:
     """What follows from the counts: appends, one atomicAdd a round, memory."""
     event = CoarseRasterizerEvent
     segment = 128 if simt.coalescing == 2 else 32
@@ -254,6 +255,7 @@ def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], simt: Simt)
     events[:, event.APPEND_STEPS] = appended.max(axis=2).sum(axis=1)  # at least: lanes of a warp seldom share a step
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[:, name] = events[:, event.ROUNDS]
+    events[:, event.SUB_QUEUES] = sub_queues
     loads = events[:, event.WARP_LANES] * (SETUP_BYTES // 4 + 1)
     events[:, event.LOAD_TRANSACTIONS] = loads
     events[:, event.LOAD_BYTES] = loads * segment

@@ -232,9 +232,9 @@ def fine_rasterizer(
     drawn = len(np.unique(tiles.entries))
     streams = (
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),
-        Stream("setup", "load", int(total[FineRasterizerEvent.LOAD_BYTES]), drawn * SETUP_BYTES),
+        Stream("setup", "load", 160 * int(total[FineRasterizerEvent.ROUND_LANES]), drawn * SETUP_BYTES),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments", "store", int(total[FineRasterizerEvent.STORE_BYTES]), 4 * FRAGMENT_BYTES * int(total[7])),
+        Stream("fragments", "store", 4 * FRAGMENT_BYTES * int(total[7]), 4 * FRAGMENT_BYTES * int(total[7])),
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"

@@ -258,9 +258,9 @@ def pixel_shader(
     total = events.sum(axis=0)
     texture = int(total[PixelShaderEvent.TEXTURE_BYTES])
     streams = (
-        Stream("fragments", "load", int(total[PixelShaderEvent.LOAD_BYTES]) - texture, 4 * count * FRAGMENT_BYTES),
+        Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
         Stream("texture", "load", texture, min(texture, len(chains.texels) * TEXEL_BYTES)),
-        Stream("fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES),
+        Stream("fragments_out", "store", 4 * count * FRAGMENT_OUT_BYTES, 4 * count * FRAGMENT_OUT_BYTES),
         Stream("pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), 4 * pixels),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"

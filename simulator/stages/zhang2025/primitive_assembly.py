@@ -182,8 +182,8 @@ def primitive_assembly(
     events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
     total = events.sum(axis=0)
     streams = (
-        Stream("vertices_out", "load", int(total[PrimitiveAssemblyEvent.LOAD_BYTES]), len(x) * VERTEX_BYTES),
-        Stream("primitives", "store", int(total[PrimitiveAssemblyEvent.STORE_BYTES]), used * PRIMITIVE_BYTES),
+        Stream("vertices_out", "load", 3 * 64 * count, len(x) * VERTEX_BYTES),
+        Stream("primitives", "store", used * PRIMITIVE_BYTES, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
     work = Work(stage, stage, PrimitiveAssemblyEvent, events, blocks, BLOCK, streams=streams)

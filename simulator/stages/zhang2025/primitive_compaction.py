@@ -63,10 +63,11 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
     events[:, PrimitiveCompactionEvent.LOAD_BYTES] = warps * ids[1] + words * segment
     events[:, PrimitiveCompactionEvent.STORE_TRANSACTIONS] = words
     events[:, PrimitiveCompactionEvent.STORE_BYTES] = words * segment
-    total = events.sum(axis=0)
     streams = (
-        Stream("primitives", "load", int(total[4]), blocks * BLOCK * PRIMITIVE_BYTES),
-        Stream("compacted", "store", int(total[6]), len(kept) * PRIMITIVE_BYTES),
+        Stream(
+            "primitives", "load", 32 * blocks * BLOCK + len(kept) * PRIMITIVE_BYTES, blocks * BLOCK * PRIMITIVE_BYTES
+        ),
+        Stream("compacted", "store", len(kept) * PRIMITIVE_BYTES, len(kept) * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveCompaction"
     work = Work(stage, stage, PrimitiveCompactionEvent, events, blocks, BLOCK, streams=streams)

@@ -122,6 +122,8 @@ def _rop_block(
             if x >= width or y >= height:
                 continue
             live += 1
+            if heads[y, x] < 0:
+                continue
             lane[0] = 0
             bit = np.uint64(1) << np.uint64(y % TILE * TILE + x % TILE)
             count = _gather(

@@ -1,0 +1,1 @@
+"""Jian Ru's CUDA rasterizer (2016) on a GT 750M."""

@@ -1,0 +1,73 @@
+"""Ru 2016, performance against tile size: occupancy and time of the engine at tiles of 4, 8, 16, 32."""
+
+from collections.abc import Callable
+
+import pandas as pd
+
+from experiments.result import Cell, Figure, Result
+from experiments.ru2016.setting import MACHINE, SOURCE, draw, missing, published
+from models.machine import load_machine
+from models.occupancy import residency
+from reports.plots import paired_bars
+
+REGISTERS = 63  # published
+MODEL = "2CylinderEngine"
+FITTED_TILE = 8  # one scale is fitted on this cell: his view of the engine is not known
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Draw the engine at four tile sizes."""
+    table = published("tile_size")
+    machine = load_machine(MACHINE)
+    cells, times = [], {}
+    for row in table.itertuples():
+        tile = int(row.tile_size)
+        progress(f"tile {tile}")
+        held = residency(machine, tile * tile, REGISTERS, 0)
+        label = f"{tile}x{tile}"
+        cells.append(Cell(label, "occupancy", "%", float(row.occupancy_percent), 100.0 * held.occupancy, aim=0.0))
+        cells.append(Cell(label, "resident blocks", "blocks", float(row.resident_blocks), held.blocks, aim=0.0))
+        frame = draw(MODEL, "tiled", tile=tile, capacity="original")
+        if frame is not None:
+            times[tile] = frame
+    notes = ["His view of the engine is not known: it fills the window here, and one scale is fitted at tile 8."]
+    rows: list[Cell] = []
+    if times:
+        asked = dict(zip(table.tile_size, table.ms, strict=True))
+        scale = float(asked[FITTED_TILE]) / times[FITTED_TILE].milliseconds
+        notes.append(f"Scale fitted at tile {FITTED_TILE}: {scale:.2f}; unscaled times are in runs.csv.")
+        for tile, frame in times.items():
+            status = "fitted" if tile == FITTED_TILE else "predicted"
+            ours = scale * frame.milliseconds
+            rows.append(Cell(f"{tile}x{tile}", "time", "ms", float(asked[tile]), ours, status, aim=0.2))
+        order = sorted(times, key=lambda tile: times[tile].milliseconds)
+        notes.append(f"Order in time: {' < '.join(map(str, order))} (published: 8 < 4 < 16 < 32).")
+    bars = pd.DataFrame([{"tile": c.row, "ours": c.ours, "published": c.published, "status": c.status} for c in rows])
+    figures = []
+    if rows:
+        title = "The engine by tile size (GT 750M)"
+        figures.append(
+            Figure(
+                "time",
+                lambda path: paired_bars(
+                    bars,
+                    path,
+                    label="tile",
+                    ours="ours",
+                    published="published",
+                    status="status",
+                    title=title,
+                    y_label="ms",
+                ),
+            )
+        )
+    runs = pd.DataFrame([{"tile": tile, "unscaled_ms": f.milliseconds, **_raster(f)} for tile, f in times.items()])
+    warnings = [] if times else missing([MODEL])
+    return Result("ru2016/tile_size", "Tile size", SOURCE, cells + rows, figures, notes, warnings, {"runs": runs})
+
+
+def _raster(frame: object) -> dict[str, float]:
+    """What the raster kernel did."""
+    stages = frame.stages  # type: ignore[attr-defined]
+    row = stages.loc["tiled_raster"]
+    return {"raster_ms": row.milliseconds, "bound": row.bound, "sample_tests": row.sample_tests, "ste": row.ste}

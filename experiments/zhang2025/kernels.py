@@ -1,0 +1,71 @@
+"""Zhang 2025, kernel performance: ten kernels before and after optimization, on the two GPUs that it may have been."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from experiments.result import Cell, Figure, Result
+from experiments.zhang2025.setting import CANDIDATES, SOURCE, bunny, draw, published
+from models.machine import load_machine
+from reports.plots import paired_bars
+from simulator.run import Run
+from simulator.stages.zhang2025.primitive_compaction import most_triangles
+
+AIM = 0.5
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Draw the bunny with both sets of kernels, and price both on both machines."""
+    scene = bunny()
+    limits = [f"{name} {most_triangles(load_machine(name)):,}" for name in CANDIDATES]
+    notes = [
+        "No cell is fitted: instructions are counted by hand from his loops, registers are published, and the caches' and "
+        "launch constants of both machines are assumed.",
+        f"Triangles that the cooperative compaction can take by the machine file: {', '.join(limits)} (he says 10 k).",
+    ]
+    if scene is None:
+        warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
+        return Result("zhang2025/kernels", "Ten kernels", SOURCE, [], [], notes, [warning])
+    cells: list[Cell] = []
+    errors: dict[str, float] = {}
+    table = published("kernels").set_index("kernel")
+    for machine in CANDIDATES:
+        ratios = []
+        for column, optimized in (("before_us", False), ("after_us", True)):
+            progress(f"{machine} {column}")
+            times = kernel_times(draw(scene, machine, optimized=optimized))
+            for kernel, asked in table[column].items():
+                name = f"{machine} {column.removesuffix('_us')}"
+                cells.append(Cell(str(kernel), name, "us", float(asked), times[str(kernel)], aim=AIM))
+                ratios.append(times[str(kernel)] / float(asked))
+            total, ours = float(table[column].sum()), sum(times.values())
+            cells.append(Cell("sum", f"{machine} {column.removesuffix('_us')}", "us", total, ours, aim=0.3))
+        errors[machine] = float(np.exp(np.mean(np.abs(np.log(ratios)))))
+    best = min(errors, key=lambda name: errors[name])
+    stated = ", ".join(f"{name} a factor {error:.2f}" for name, error in errors.items())
+    notes.append(f"Mean miss of a kernel (geometric): {stated}. {best} fits better.")
+    return Result("zhang2025/kernels", "Ten kernels before and after", SOURCE, cells, [_figure(cells)], notes)
+
+
+def kernel_times(frame: Run) -> dict[str, float]:
+    """Microseconds by stage."""
+    return {str(stage): 1e3 * float(ms) for stage, ms in frame.stages.milliseconds.items()}
+
+
+def _figure(cells: list[Cell]) -> Figure:
+    """Bars of all kernels after optimization on the first candidate."""
+    column = f"{CANDIDATES[0]} after"
+    rows = [
+        {"kernel": c.row, "ours": c.ours, "published": c.published, "status": c.status}
+        for c in cells
+        if c.column == column and c.row != "sum"
+    ]
+    bars = pd.DataFrame(rows)
+    return Figure(
+        "after",
+        lambda path: paired_bars(
+            bars, path, label="kernel", ours="ours", published="published", status="status",
+            title=f"Kernels after optimization ({CANDIDATES[0]})", y_label="us",
+        ),
+    )  # fmt: skip

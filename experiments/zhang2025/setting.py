@@ -1,0 +1,57 @@
+"""The scene and the candidates of Zhang's measurements: a bunny of 5,000 triangles at 1920x1080.
+
+His bunny, his view and his GPU are not known: the bunny of 4,968 triangles fills the window here, with a checkered
+texture by its position, so that the pixel shader samples as his does.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from models.errors import TilestampError
+from simulator.run import Run
+from simulator.scenes.library import load_scene
+from simulator.scenes.scene import Mesh, Scene
+from simulator.simulate import simulate
+
+WIDTH, HEIGHT = 1920, 1080
+CANDIDATES = ("ga104", "rtx3080")
+SOURCE = "Zhang 2025, README and Nsight Compute tables (1920x1080, 5,000 triangles; GPU not named)"
+FOLDER = Path(__file__).parent
+TEXTURE = 1024  # texels on a side
+
+
+def published(name: str) -> pd.DataFrame:
+    """Read a table of the source."""
+    return pd.read_csv(FOLDER / f"{name}.csv")
+
+
+def bunny() -> Scene | None:
+    """The bunny with a texture; None where it is not on the scene path."""
+    try:
+        scene = load_scene("bunny_5k", kind="mesh")
+    except TilestampError:
+        return None
+    assert scene.mesh is not None  # noqa: S101 - asked for a mesh
+    return replace(scene, mesh=textured(scene.mesh))
+
+
+def textured(mesh: Mesh) -> Mesh:
+    """Give a mesh texture coordinates by its position, and a checkered texture with noise."""
+    points = mesh.positions[:, :3]
+    low, high = points.min(axis=0), points.max(axis=0)
+    uvs = ((points - low) / (high - low).max())[:, :2].astype(np.float32)
+    y, x = np.mgrid[0:TEXTURE, 0:TEXTURE]
+    checks = ((x // 64 + y // 64) % 2 * 96 + 128).astype(np.uint8)
+    noise = np.random.default_rng(5).integers(0, 32, (TEXTURE, TEXTURE, 1), dtype=np.uint8)
+    texture = np.full((TEXTURE, TEXTURE, 4), 255, np.uint8)
+    texture[..., :3] = checks[..., None] + noise
+    ids = np.zeros(len(mesh.triangles), np.int32)
+    return replace(mesh, uvs=uvs, texture_ids=ids, textures=(texture,))
+
+
+def draw(scene: Scene, machine: str, **options: object) -> Run:
+    """Draw the scene as he did."""
+    return simulate(scene, "binned", machine, width=WIDTH, height=HEIGHT, fidelity="schedule", **options)  # type: ignore[arg-type]
