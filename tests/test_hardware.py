@@ -1,0 +1,95 @@
+"""The fixed-function pipe: picture and items."""
+
+import numpy as np
+import pytest
+
+from models.errors import TilestampError
+from models.machine import load_machine
+from models.price import price
+from models.simt import Simt
+from simulator.pipelines.hardware import hardware as pipeline
+from simulator.scenes.scene import Mesh, Scene
+from simulator.stages.hardware import hardware, hardware_grids
+from tests.test_freepipe import LARGE, TINY, flat
+
+
+@pytest.mark.parametrize("name", ["bunny", "nearclip5k", "edges_512"])
+def test_coverage_at_four_bits_is_cudarasters(shared, name):
+    data, gpu = (np.load(shared / f"silicon/ids/{name}_{part}.npz") for part in ("input", "512"))
+    frame, _, _ = hardware(data["positions"], data["triangles"], 512, 384, cull_backfaces=False, bits=4)
+    assert np.array_equal(frame.ids >= 0, gpu["id"] > 0)
+    assert np.count_nonzero(frame.ids != gpu["id"].astype(int) - 1) <= 2  # depths that float32 cannot tell apart
+
+
+def test_a_pixel_triangle_touches_one_quad():
+    _, work, facts = hardware(*flat(TINY), 64, 64)
+    assert (work.items["quads"], work.items["z"], work.items["samples"]) == (1, 1, 1)
+    assert facts["quad_efficiency"] == 0.25
+
+
+def test_a_square_of_quads_is_touched_twice_along_its_diagonal():
+    frame, work, _ = hardware(*flat([(0, 0), (8, 0), (0, 8), (0, 8), (8, 0), (8, 8)]), 64, 64)
+    assert work.items["z"] == 64 == np.count_nonzero(frame.ids >= 0)
+    assert work.items["quads"] == 16 + 4
+
+
+def test_hidden_pixels_are_tested_and_not_written():
+    near, far = flat(LARGE, -0.5)[0], flat(LARGE, 0.5)[0]
+    _, work, _ = hardware(np.vstack([near, far]), np.arange(6, dtype=np.int32).reshape(2, 3), 64, 64)
+    assert work.items["z"] == 2 * work.items["samples"] == 2 * work.items["pixels"]
+
+
+def test_of_equal_depths_the_first_stays():
+    frame, _, _ = hardware(*flat(LARGE * 2), 64, 64)
+    assert set(frame.ids[frame.ids >= 0]) == {0}
+
+
+def test_what_turns_away_is_culled_only_when_asked():
+    positions, triangles = flat(LARGE)
+    away = triangles[:, ::-1].copy()
+    assert hardware(positions, away, 64, 64)[1].items["culled"] == 1
+    assert hardware(positions, away, 64, 64, cull_backfaces=False)[1].items["culled"] == 0
+
+
+def test_what_lies_between_pixel_centres_is_culled():
+    _, work, _ = hardware(*flat([(1.6, 1.6), (2.4, 1.6), (1.6, 2.4)]), 64, 64)
+    assert (work.items["culled"], work.items["quads"]) == (1, 0)
+
+
+def test_a_grid_is_drawn_as_two_triangles_a_quad_without_holes_or_double_hits():
+    x, y = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 4))
+    grid = np.stack([x, y, 0 * x, 1 + 0 * x], axis=-1)[None].astype(np.float32)
+    frame, work, _ = hardware_grids(grid, 33, 21)
+    assert (work.items["primitives"], work.items["z"]) == (24, 33 * 21)
+    assert sorted(set(frame.ids.ravel())) == list(range(12))
+    assert frame.ids[0, 0] == 0
+
+
+@pytest.mark.parametrize("bits", [4, 6, 8])
+def test_a_fan_has_no_hole_at_any_precision(bits):
+    angle = np.linspace(0, 2 * np.pi, 40)[:-1]
+    rim = np.column_stack([0.9 * np.cos(angle), 0.9 * np.sin(angle), 0 * angle, 1 + 0 * angle])
+    positions = np.vstack([[0.013, 0.007, 0, 1], rim]).astype(np.float32)
+    triangles = np.array([(0, 1 + i, 1 + (i + 1) % 39) for i in range(39)], np.int32)
+    frame, work, _ = hardware(positions, triangles, 100, 80, bits=bits)
+    assert work.items["z"] == np.count_nonzero(frame.ids >= 0)
+
+
+def test_the_machine_file_prices_every_item():
+    _, work, _ = hardware(*flat(LARGE), 64, 64)
+    (timing,) = price([work.launch()], load_machine("gtx480"))
+    assert timing.milliseconds > 0
+    assert set(work.items) <= set(timing.term_cycles)
+
+
+def test_the_pipeline_puts_the_top_row_first():
+    positions, triangles = flat([(0, 0), (64, 0), (0, 20)])
+    frame = pipeline(Scene("low", mesh=Mesh(positions, triangles, clip_space=True)), np.eye(4), 64, 64, Simt())
+    assert (frame.triangle_ids[-1, 0], frame.triangle_ids[0, 0]) == (0, -1)
+    assert frame.works[0].stage == "hardware"
+
+
+@pytest.mark.parametrize(("size", "bits"), [((0, 5), 8), ((20000, 5), 8), ((8, 8), 3)])
+def test_sizes_and_bits_that_cannot_be_are_refused(size, bits):
+    with pytest.raises(TilestampError, match="hardware"):
+        hardware(*flat(TINY), *size, bits=bits)
