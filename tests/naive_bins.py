@@ -66,7 +66,7 @@ def squares(corners, box, origin, side, tested):
 
 
 def rounds_of(setup):
-    """Rounds of up to 512 queue entries, batch by batch, with the ring's overflows counted."""
+    """Take rounds of up to 512 queue entries, batch by batch, and count the ring's overflows."""
     triangles = len(setup.subtriangles)
     batch = min(max(triangles // 16384, 1), 32) * 512
     rounds, overflows = [], 0

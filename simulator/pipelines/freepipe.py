@@ -66,4 +66,5 @@ def _flat_colors(colors: NDArray[np.float32], triangles: NDArray[np.int32]) -> N
     safe = np.clip(triangles, 0, len(colors) - 1)  # the stage refuses what is out of range
     mean = colors[safe, :3].mean(axis=1)
     byte = np.clip(np.nan_to_num(mean) * 255 + 0.5, 0, 255).astype(np.uint32)
-    return byte[:, 0] << np.uint32(16) | byte[:, 1] << np.uint32(8) | byte[:, 2]
+    packed: NDArray[np.uint32] = byte[:, 0] << np.uint32(16) | byte[:, 1] << np.uint32(8) | byte[:, 2]
+    return packed

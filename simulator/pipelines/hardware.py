@@ -1,14 +1,16 @@
 """The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
+from simulator.stages.freepipe_shade import pixel_colors
 from simulator.stages.hardware import SUBPIXEL_BITS
 from simulator.stages.hardware import hardware as draw
-from simulator.stages.freepipe_shade import pixel_colors
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 
@@ -36,5 +38,6 @@ def hardware(
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     frame, work, facts = draw(positions, mesh.triangles, width, height, cull_backfaces=cull_backfaces, bits=bits)
+    works: list[Any] = [work]
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
-    return Frame(image[::-1], frame.depth[::-1], [work], frame.ids[::-1], facts=facts)
+    return Frame(image[::-1], frame.depth[::-1], works, frame.ids[::-1], facts=facts)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
-from simulator.stages.bin_raster_batch import BIN_SEGMENT, BLOCK, ENTRY_BYTES, BinInput, BinRasterEvent, _play_batch
+from simulator.stages.bin_raster_batch import BIN_SEGMENT, BLOCK, ENTRY_BYTES, BinInput, _play_batch
 from simulator.stages.bin_raster_cover import HEADER_BYTES, transaction_bytes
+from simulator.stages.bin_raster_events import BinRasterEvent
 from simulator.work import Work
 
 RELEASES = ("1.1", "nvdiffrast")
@@ -53,7 +54,7 @@ def _count_batches(given, batch, counts, events):
 
 @njit(cache=True, nogil=True, parallel=True)
 def _fill_batches(given, batch, counts, entries):
-    """Write each batch's entries from the places in its row of ``counts``; only count them where ``entries`` is None."""
+    """Write each batch's entries from the places in its row of ``counts``; only count where ``entries`` is None."""
     for b in prange(counts.shape[0]):
         _play_batch(given, b, batch, counts[b], entries, None)
 

@@ -5,7 +5,6 @@ every event, ``_fill_batch`` writes the entries where the counts have made room.
 the path of a warp (which decides whether its triangles are tested) depends on the company that they are in.
 """
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -25,56 +24,13 @@ from simulator.stages.bin_raster_cover import (
     _touches,
     _walk_votes,
 )
+from simulator.stages.bin_raster_events import BinRasterEvent
 
 BLOCK = 512  # threads, and triangles of a round
 RING = 2048  # entries that wait for their round
 BIN_SEGMENT = 512  # entries
 ENTRY_BYTES = 4
 SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x 2, anything
-
-
-class BinRasterEvent(IntEnum):
-    """Events of one draw from the batch queue, a column each."""
-
-    CTA_STARTS = 0  # blocks that start and end (the rows in front)
-    BATCHES = 1  # batches drawn
-    READ_STEPS = 2  # block-wide reads of 512 sub-triangle counts, with their compaction
-    READ_WARPS = 3  # warps of those with a triangle to read
-    READ_LANES = 4  # triangles read, again after an overflow included
-    VISIBLE_LANES = 5  # triangles read that have a sub-triangle
-    ENTRIES = 6  # sub-triangles put into the ring
-    OVERFLOWS = 7  # reads cut short because the ring was full
-    ROUNDS = 8  # rounds, empty ones included
-    ROUND_WARPS = 9  # warps of those with a triangle
-    TRIANGLES = 10  # lanes of those: triangles binned
-    INDIRECT_WARPS = 11  # warps that look up the run of a clipped triangle first
-    BOX_BINS = 12  # bins in the boxes of all triangles
-    SINGLE_WARPS = 13
-    SINGLE_LANES = 14
-    SINGLE_LOOPS = 15  # distinct bins, summed over single warps: turns of the vote in release 1.1
-    FAST_WARPS = 16
-    FAST_LANES = 17
-    SLOW_WARPS = 18
-    SLOW_LANES = 19
-    SLOW_STEPS = 20  # steps that slow warps walk: as many as the largest box has bins
-    SLOW_LANE_STEPS = 21  # edge tests: bins in the boxes of slow warps' triangles
-    ENQUEUE_STEPS = 22  # steps at which a warp writes entries
-    EMITS = 23  # entries written: bin-triangle pairs
-    SEGMENTS = 24  # new bin segments
-    ALLOC_ROUNDS = 25  # rounds that need a segment
-    ALLOC_WARPS = 26  # warps of bins with a new segment, each a shared add
-    CLOSED_SEGMENTS = 27  # segments open at the end of the batch
-    SHARED_ATOMIC = 28
-    BANK_REPLAYS = 29  # further passes of the shared ORs
-    ATOMIC = 30  # draws and segment allocations
-    ATOMIC_LANES = 31
-    ATOMIC_REQUESTS = 32
-    ATOMIC_DEPTH = 33
-    LOAD = 34
-    LOAD_TRANSACTIONS = 35
-    LOAD_BYTES = 36
-    STORE_TRANSACTIONS = 37  # of the queue entries
-    STORE_BYTES = 38
 
 
 class BinInput(NamedTuple):
@@ -132,7 +88,7 @@ def _read_step(given, ring, read, write, first, end, events):
     go_on = last
     visible, start = 0, write
     for triangle in range(first, last):
-        n = np.int64(given.subtriangles[triangle])
+        n = int(given.subtriangles[triangle])
         visible += n > 0
         if go_on < last:
             continue
@@ -204,7 +160,7 @@ def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, event
 
 
 @njit(cache=True, nogil=True)
-def _distinct_bins(boxes, lanes, stride):
+def _distinct_bins(boxes, lanes):
     """Distinct bins of a warp whose boxes are one bin each."""
     distinct = 0
     for lane in range(lanes):
@@ -229,7 +185,7 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
     if path == SINGLE:
         events[BinRasterEvent.SINGLE_WARPS] += 1
         events[BinRasterEvent.SINGLE_LANES] += lanes
-        events[BinRasterEvent.SINGLE_LOOPS] += _distinct_bins(boxes, lanes, given.bins_x)
+        events[BinRasterEvent.SINGLE_LOOPS] += _distinct_bins(boxes, lanes)
         ors, replays = 0, 0
     elif path == FAST:
         events[BinRasterEvent.FAST_WARPS] += 1
@@ -249,7 +205,7 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
 
 @njit(cache=True, nogil=True)
 def _count_segments(counts, before, events):
-    """New segments of a round: a bin needs one where its entries pass a multiple of 512."""
+    """Count new segments of a round: a bin needs one where its entries pass a multiple of 512."""
     fresh, warps = 0, 0
     for first in range(0, counts.size, WARP):
         mine = 0

@@ -1,4 +1,4 @@
-"""What bin and coarse raster share: triangles against squares, walked by a warp (Laine & Karras 2011, sections 4 and 5).
+"""What bin and coarse raster share: triangles against squares, walked by a warp (Laine & Karras 2011, sections 4, 5).
 
 Both stages ask the same question at two scales: which squares (bins of 2048, tiles of 128 sub-pixels) does a
 triangle touch? A lane owns a triangle, walks the squares of its box row by row, and sets its bit in the mask of
@@ -101,7 +101,7 @@ def _count_corner(boxes, lanes, stride, wide, high):
     for lane in range(lanes):
         box = boxes.box[lane]
         if box[2] > wide and box[3] > high:
-            bank = (box[0] + wide + (box[1] + high) * stride) % WARP
+            bank = (box[0] + wide + (box[1] + high) * stride) & (WARP - 1)
             boxes.bank[bank] += 1
             deepest = max(deepest, boxes.bank[bank])
     return deepest - 1
@@ -109,7 +109,7 @@ def _count_corner(boxes, lanes, stride, wide, high):
 
 @njit(cache=True, nogil=True)
 def _small_votes(boxes, lanes, stride):
-    """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one OR for each corner that any lane has."""
+    """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
     ors, replays = 0, 0
     for corner in range(4):
         deep = _count_corner(boxes, lanes, stride, corner & 1, corner >> 1)
@@ -130,7 +130,7 @@ def _walk_votes(boxes, lanes, steps, stride):
             if step < box[2] * box[3]:
                 column, row = step % box[2], step // box[2]
                 if _touches(boxes, lane, column, row):
-                    bank = (box[0] + column + (box[1] + row) * stride) % WARP
+                    bank = (box[0] + column + (box[1] + row) * stride) & (WARP - 1)
                     boxes.bank[bank] += 1
                     deepest = max(deepest, boxes.bank[bank])
         if deepest > 0:

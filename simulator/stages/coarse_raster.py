@@ -25,9 +25,9 @@ from simulator.stages.coarse_raster_bin import (
     TILE_SEGMENT,
     TILES,
     CoarseInput,
-    CoarseRasterEvent,
     _play_bin,
 )
+from simulator.stages.coarse_raster_events import CoarseRasterEvent
 from simulator.work import Work
 
 TILE_PIXELS = 8
@@ -203,7 +203,7 @@ def _work(
 
 
 def _sort_loads(bins: int, segment_bytes: int) -> tuple[int, int, int]:
-    """Loads, transactions and bytes of one block that sorts the bins: two a warp, and each bin's total of 16 streams."""
+    """Count loads, transactions and bytes of a block that sorts the bins: two a warp, and 16 totals of each bin."""
     loads = 2 * WARPS + STREAMS * -(-bins // WARP)
     lines = (
         STREAMS * -(-bins * STREAMS * ENTRY_BYTES // segment_bytes) // max(STREAMS * ENTRY_BYTES // segment_bytes, 1)

@@ -24,8 +24,9 @@ from models.atomics import CHUNK_BYTES
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
+from simulator.stages.freepipe_events import FreePipeEvent
 from simulator.stages.freepipe_triangle import SUBPIXEL_BITS, Pieces, _fixed_depth, _start_edges, make_pieces
-from simulator.stages.freepipe_warp import WARP, FrameShape, FreePipeEvent, _blocks
+from simulator.stages.freepipe_warp import WARP, FrameShape, _blocks
 from simulator.work import Work
 
 Packing = Literal["64", "32"]
@@ -171,8 +172,8 @@ def freepipe(
     _check(positions, triangles, width, height, packing, early, block, simt)
     pieces = make_pieces(positions, triangles, width, height)
     if colors is None:
-        colors = (np.arange(len(triangles), dtype=np.uint32) + 1) & 0xFFFFFF
-    frame = _make_frame(pieces, width, height, packing, colors)
+        colors = ((np.arange(len(triangles)) + 1) & 0xFFFFFF).astype(np.uint32)
+    frame = _make_frame(pieces, width, height, packing, np.ascontiguousarray(colors, np.uint32))
     facts: dict[str, Any] = {
         "tied_pixels": int(frame.tied.sum()),
         "mixed_pixels": int(frame.mixed.sum()),
@@ -252,9 +253,7 @@ def _make_work(
     tables = np.zeros((workers, blocks, len(FreePipeEvent)), np.int64)
     chunks = np.zeros((workers, -(-size // CHUNK_BYTES)), np.int64)
     if early:
-        _blocks(
-            triangles, pieces, block, 0, 1, shape, simt, tables[0], chunks[0], np.full(pixels, EMPTY, np.uint64)
-        )
+        _blocks(triangles, pieces, block, 0, 1, shape, simt, tables[0], chunks[0], np.full(pixels, EMPTY, np.uint64))
     else:
         _count(triangles, pieces, block, shape, simt, tables, chunks)
     table, requests = tables.sum(axis=0), chunks.sum(axis=0)

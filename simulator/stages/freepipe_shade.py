@@ -26,8 +26,6 @@ def pixel_colors(
     drawn = ids >= 0
     u, v = np.moveaxis(pixel_barycentrics(ids, positions, triangles)[drawn][:, :2], 1, 0)
     corners = triangles[ids[drawn]]
-    shaded = sum(
-        weight[:, None] * colors[corners[:, k], :3] for k, weight in enumerate((u, v, 1 - u - v))
-    )
+    shaded = sum(weight[:, None] * colors[corners[:, k], :3] for k, weight in enumerate((u, v, 1 - u - v)))
     image[drawn] = np.clip(np.nan_to_num(shaded) * 255 + 0.5, 0, 255)
     return image

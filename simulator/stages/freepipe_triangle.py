@@ -43,7 +43,7 @@ def _is_inside(p):
     largest = _F0  # the maximum of magnitudes, which ignores a NaN
     for c in range(3):
         magnitude = abs(p[c])
-        if magnitude > largest:
+        if magnitude > largest:  # noqa: PLR1730 - max() may hand a NaN on
             largest = magnitude
     return p[3] >= largest
 

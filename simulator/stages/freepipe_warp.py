@@ -5,7 +5,6 @@ each row that any lane still has, as many steps as the widest box among those la
 clipping go first; then the others scan the triangles of their clipped polygons, one after another.
 """
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -14,36 +13,12 @@ from numpy.typing import NDArray
 
 from models.atomics import CHUNK_BYTES, SECTOR
 from models.coalescing import transactions
+from simulator.stages.freepipe_events import FreePipeEvent
 from simulator.stages.freepipe_triangle import CLIPPED, INSIDE, SUBPIXEL_BITS, _fixed_depth, _start_edges
 
 WARP = 32
 INDEX_BYTES = 4
 POSITION_BYTES = 16
-
-
-class FreePipeEvent(IntEnum):
-    """Events of one block, a column each."""
-
-    WARPS = 0  # warps with a triangle
-    LANES_IN = 1  # triangles
-    CLIP_WARPS = 2  # warps in which a lane clips
-    CLIP_LANES = 3
-    SETUP_STEPS = 4  # warp executions of the set-up of a scan
-    SETUP_LANES = 5
-    ROW_STEPS = 6  # turns of the outer loop
-    ROW_LANES = 7
-    WARP_STEPS = 8  # turns of the inner loop: one sample test of each lane
-    SAMPLE_TESTS = 9  # lanes of those
-    SAMPLE_HITS = 10
-    READS = 11  # early: loads of the pixel before the atomic
-    ATOMIC = 12
-    ATOMIC_LANES = 13
-    ATOMIC_REQUESTS = 14
-    ATOMIC_CONFLICTS = 15
-    ATOMIC_DEPTH = 16
-    LOAD_TRANSACTIONS = 17
-    LOAD_BYTES = 18
-    CHAIN_STEPS = 19  # steps of the block's longest warp, for what nothing else hides
 
 
 class Lanes(NamedTuple):
@@ -75,7 +50,7 @@ def _new_lanes():
 
 @njit(cache=True, nogil=True)
 def _count_vertices(triangles, t0, lanes, simt, address, row):
-    """Loads of three indices and three positions a lane."""
+    """Count loads of three indices and three positions a lane."""
     for k in range(3):
         for lane in range(lanes):
             address[lane] = (t0 + lane) * 3 * INDEX_BYTES + INDEX_BYTES * k
@@ -98,7 +73,7 @@ def _start_rows(pieces, lanes):
             box = pieces.box[p]
             _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
             lanes.row_depth[lane] = pieces.depth[p, 0]
-            most = max(most, np.int64(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
+            most = max(most, int(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
     return active, most
 
 
@@ -110,7 +85,7 @@ def _start_row(pieces, lanes, r):
         p = lanes.piece[lane]
         if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
             active += 1
-            widest = max(widest, np.int64(pieces.box[p, 1] - pieces.box[p, 0] + 1))
+            widest = max(widest, int(pieces.box[p, 1] - pieces.box[p, 0] + 1))
             for k in range(3):
                 lanes.pixel[lane, k] = lanes.row[lane, k]
                 lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
