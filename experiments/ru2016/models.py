@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
+from experiments.result import Cell, Figure, Result, Status
 from experiments.ru2016.setting import SOURCE, draw, missing, published
 from reports.plots import paired_bars
 
@@ -14,6 +14,7 @@ METHODS = {
     "per_primitive_ms": ("per-primitive", {}),
 }
 AIM = 0.5
+FITTED = ("triangle", "per_primitive_ms")  # the dependent loads of a hit, in the mix
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -33,14 +34,16 @@ def run(progress: Callable[[str], None]) -> Result:
                 absent.append(name)
                 break
             ours[column] = frame.milliseconds
-            cells.append(Cell(name, column.removesuffix("_ms"), "ms", float(row[column]), ours[column], aim=AIM))
+            status: Status = "fitted" if (name, column) == FITTED else "predicted"
+            cells.append(Cell(name, column.removesuffix("_ms"), "ms", float(row[column]), ours[column], status, aim=AIM))
             if name == "triangle" and column == "tile_ms":
                 floor = frame.stages.milliseconds.to_dict()
         if len(ours) == len(METHODS):
             same = (ours["tile_ms"] < ours["per_primitive_ms"]) == (row["tile_ms"] < row["per_primitive_ms"])
             (agreed if same else missed).append(name)
     notes = [
-        "No cell is fitted: kernels from hand-counted operations, machine from published figures.",
+        "One cell is fitted, one triangle per primitive: the dependent loads of a hit. All else is hand-counted operations and "
+        "the published machine. His views of flower, cow and di are not known, nor is the box's.",
         f"The same method wins as published on {', '.join(agreed)}; not on {', '.join(missed) or 'none'}.",
         "The floor of 5.3 ms, by stage, on one triangle: "
         + ", ".join(f"{stage} {ms:.2f}" for stage, ms in floor.items() if ms > 0.01)

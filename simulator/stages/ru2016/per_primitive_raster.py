@@ -56,6 +56,7 @@ class PerPrimitiveEvent(IntEnum):
     LOAD_TRANSACTIONS = 15
     LOAD_BYTES = 16
     LONGEST = 17  # most steps of a warp: the dependent chain of the block
+    LONGEST_HITS = 18  # most steps of a warp in which a lane hits
 
 
 class Race(NamedTuple):
@@ -92,6 +93,7 @@ def _wave(
             boxes[w],
             _row(events, first + w, warp),
         )
+    hit_steps = np.zeros(end - first, np.int64)
     places = np.full(warp, -1, np.int64)
     values = np.zeros(warp, np.int32)
     last = longest.max()
@@ -103,8 +105,13 @@ def _wave(
                 if hits > 0:
                     delay = 1 + ((first + w) * 2654435761 + s * 40503) // 65536 % RACE_ROUNDS
                     _write(boxes[w], places, values, depth, raced, landed, rounds + s + delay, row)
+                    hit_steps[w] += 1
                 if hits > 0 and events is not None:
                     _count_atomics(places, merge, row, requests)
+    if events is not None:
+        for w in range(end - first):
+            row = _row(events, first + w, warp)
+            row[18] = max(row[18], hit_steps[w])  # LONGEST_HITS
     return rounds + last
 
 

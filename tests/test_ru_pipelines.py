@@ -1,0 +1,202 @@
+"""Ru's pipelines: coverage, depth and attributes against double precision; lists, race, switches, bad options."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import TilestampError
+from models.machine import load_machine
+from models.occupancy import residency
+from models.simt import Simt
+from simulator.mix import load_mix
+from simulator.pipelines.per_primitive import per_primitive
+from simulator.pipelines.tiled import tiled
+from simulator.scenes.camera import LookAt
+from simulator.scenes.scene import Mesh, Scene
+from simulator.scenes.textured_mesh import geometry
+from simulator.stages.ru2016.fragment_shading import interpolate
+from simulator.stages.ru2016.tile_lists import overlaps
+from simulator.stages.ru2016.tiled_raster import Visible
+from simulator.stages.ru2016.vertex_shading import vertex_shading
+from tests import naive_textured as naive
+
+WIDTH, HEIGHT = 61, 47  # no multiples of a tile
+SIMT = Simt(coalescing=2, atomic_merge=0, sms=2)
+CAMERA = LookAt((0, 0, 4), (0, 0, 0), fov_degrees=45)
+NEAR_EDGE = 1e-4  # barycentric: float32 may decide otherwise here
+
+
+def soup(seed=3, count=40):
+    rng = np.random.default_rng(seed)
+    centers = rng.uniform(-1.2, 1.2, (count, 1, 3))
+    points = centers + rng.uniform(-0.6, 0.6, (count, 3, 3))
+    positions = np.concatenate([points.reshape(-1, 3), np.ones((3 * count, 1))], axis=1).astype(np.float32)
+    triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    texture = rng.integers(0, 256, (8, 8, 4), dtype=np.uint8)
+    uvs = rng.uniform(-1, 2, (3 * count, 2)).astype(np.float32)
+    ids = np.zeros(count, np.int32)
+    return Scene("soup", mesh=Mesh(positions, triangles, uvs=uvs, texture_ids=ids, textures=(texture,)))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return soup()
+
+
+@pytest.fixture(scope="module")
+def matrix():
+    return CAMERA.matrix(WIDTH, HEIGHT)
+
+
+def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
+    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, **options)
+
+
+def work(frame, kernel):
+    return next(w for w in frame.works if w.kernel == kernel)
+
+
+@pytest.mark.parametrize("culling", [True, False])
+@pytest.mark.parametrize(("pipeline", "options"), [(tiled, {}), (per_primitive, {"race": False})])
+def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipeline, options, culling):
+    frame = draw(scene, matrix, pipeline, culling=culling, **options)
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
+    ids, depth, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT, culling=culling)
+    sure = doubt > NEAR_EDGE
+    assert sure.mean() > 0.9
+    assert (frame.triangle_ids[sure] == ids[sure]).all()
+    drawn = sure & (ids >= 0)
+    assert frame.depth[drawn] == pytest.approx(depth[drawn], abs=1e-5)
+
+
+def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
+    mesh = geometry(scene)
+    vertices, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
+    frame = draw(scene, matrix)
+    fragments = interpolate(mesh, vertices, Visible(frame.triangle_ids, frame.depth))
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
+    for y, x in np.argwhere(frame.triangle_ids >= 0)[::17]:
+        t = mesh.triangles[frame.triangle_ids[y, x]]
+        exact = naive.perspective(screen[t], mesh.uvs[t], x + 0.5, y + 0.5)
+        area = np.linalg.det(np.concatenate([screen[t][:, :2], np.ones((3, 1))], axis=1))
+        assert fragments.uvs[y, x] == pytest.approx(exact, abs=1e-5 * max(1.0, 200.0 / abs(area)))
+
+
+def test_without_perspective_correction_the_picture_differs(scene, matrix):
+    assert (draw(scene, matrix).image != draw(scene, matrix, perspective=False).image).any()
+
+
+@pytest.mark.parametrize("tile", [4, 5, 16, 32])
+def test_the_picture_does_not_depend_on_the_tile(scene, matrix, tile):
+    assert (draw(scene, matrix, tile=tile).image == draw(scene, matrix).image).all()
+
+
+def test_tiles_and_primitives_agree_without_the_race(scene, matrix):
+    tiles, primitives = draw(scene, matrix, culling=False), draw(scene, matrix, per_primitive, race=False)
+    assert (tiles.triangle_ids != primitives.triangle_ids).mean() < 0.002  # equal integer depths
+
+
+def test_a_tile_list_holds_every_triangle_that_covers_a_pixel_of_it(scene, matrix):
+    frame = draw(scene, matrix, tile=8)
+    lengths = frame.maps["list length"]
+    for y, x in np.argwhere(frame.triangle_ids >= 0):
+        assert lengths[y // 8, x // 8] > 0
+
+
+def test_the_separating_axis_test_rejects_a_corner_of_the_box():
+    corners = [np.float32(v) for v in (0, 0, 30, 0, 0, 30)]
+    assert overlaps(*corners, *map(np.float32, (8, 8, 4)))
+    assert not overlaps(*corners, *map(np.float32, (24, 24, 4)))
+
+
+def test_a_triangle_and_tile_take_one_atomic(scene, matrix):
+    frame = draw(scene, matrix)
+    counts = work(frame, "tile_lists").counts()
+    assert counts["ATOMIC_LANES"] == counts["APPEND_LANES"] == frame.facts["list entries"]
+
+
+def test_every_thread_tests_every_entry(scene, matrix):
+    frame = draw(scene, matrix, tile=8)
+    assert work(frame, "tiled_raster").counts()["SAMPLE_TESTS"] == 64 * frame.facts["list entries"]
+
+
+def test_the_originals_room_overflows_and_says_so():
+    scene = soup(seed=1, count=110)
+    matrix = LookAt((0, 0, 40), (0, 0, 0), fov_degrees=45).matrix(WIDTH, HEIGHT)
+    assert draw(scene, matrix, capacity="original", culling=False).facts["list entries lost by overflow"] > 0
+    assert draw(scene, matrix, capacity="safe", culling=False).facts["list entries lost by overflow"] == 0
+
+
+def test_one_triangle_cannot_race(matrix):
+    frame = draw(soup(count=1), matrix, per_primitive)
+    assert frame.facts["pixels wrong by the race"] == 0
+
+
+def test_overlapping_triangles_race():
+    frame = draw(soup(count=400), CAMERA.matrix(WIDTH, HEIGHT), per_primitive)
+    assert 0 < frame.facts["pixels wrong by the race"] < frame.facts["pixels drawn"]
+
+
+def test_the_race_spoils_the_fragment_but_not_the_depth():
+    scene, matrix = soup(count=400), CAMERA.matrix(WIDTH, HEIGHT)
+    raced, meant = draw(scene, matrix, per_primitive), draw(scene, matrix, per_primitive, race=False)
+    wrong = raced.maps["pixels wrong by the race"].astype(bool)
+    assert (raced.depth == meant.depth).all()
+    assert ((raced.triangle_ids != meant.triangle_ids) == wrong).all()
+
+
+def test_a_triangle_behind_the_eye_is_dropped_and_counted(matrix):
+    scene = soup(count=2)
+    points = scene.mesh.positions.copy()
+    points[0, 2] = 10.0
+    frame = draw(Scene("behind", mesh=replace(scene.mesh, positions=points)), matrix)
+    assert frame.facts["triangles not drawn (behind the eye, or not finite)"] == 1
+
+
+def test_a_degenerate_triangle_draws_nothing(matrix):
+    scene = soup(count=1)
+    points = np.repeat(scene.mesh.positions[:1], 3, axis=0)
+    frame = draw(Scene("point", mesh=replace(scene.mesh, positions=points)), matrix, culling=False)
+    assert (frame.triangle_ids == -1).all()
+
+
+def test_occlusion_only_darkens(scene, matrix):
+    lit, dark = draw(scene, matrix).image.astype(int), draw(scene, matrix, ssao=True).image.astype(int)
+    assert (dark <= lit).all()
+    assert (dark < lit).any()
+
+
+def test_a_lone_plane_is_not_occluded(matrix):
+    corners = np.array([[-9, -9, 0, 1], [9, -9, 0, 1], [0, 12, 0, 1]], np.float32)
+    plane = Scene("plane", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32)))
+    assert (draw(plane, matrix, ssao=True).image == draw(plane, matrix).image).all()
+
+
+def test_occlusion_costs_the_same_on_every_scene(scene, matrix):
+    other = soup(seed=9, count=5)
+    tables = [work(draw(s, matrix, ssao=True), "ambient_occlusion").table for s in (scene, other)]
+    assert (tables[0] == tables[1]).all()
+
+
+def test_occlusion_refuses_a_parallel_projection(scene):
+    with pytest.raises(TilestampError, match="perspective"):
+        draw(scene, np.diag([0.3, 0.3, -0.1, 1.0]), ssao=True)
+
+
+@pytest.mark.parametrize("options", [{"tile": 3}, {"tile": 33}, {"capacity": "huge"}, {"texture_filter": "cubic"}])
+def test_a_bad_option_is_refused(scene, matrix, options):
+    with pytest.raises(TilestampError):
+        draw(scene, matrix, **options)
+
+
+@pytest.mark.parametrize(("tile", "occupancy"), [(4, 0.25), (8, 0.5), (16, 0.5), (32, 0.5)])
+def test_occupancy_is_the_published_one(tile, occupancy):
+    assert residency(load_machine("gt750m"), tile * tile, 63, 0).occupancy == occupancy
+
+
+@pytest.mark.parametrize(("name", "pipeline"), [("tiled", tiled), ("per-primitive", per_primitive)])
+def test_every_kernel_has_a_price(scene, matrix, name, pipeline):
+    mix = load_mix(name, "3.0")
+    for w in draw(scene, matrix, pipeline, ssao=True).works:
+        assert mix.launch(w, 32).events.sum() > 0
