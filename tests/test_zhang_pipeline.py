@@ -1,0 +1,195 @@
+"""Zhang's pipeline: coverage and depth in double precision, clipping, order, transparency, quads, texture traffic."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import TilestampError
+from models.launch_graph import Node, as_graph, on_stream
+from models.machine import load_machine
+from models.simt import Simt
+from simulator.mix import load_mix
+from simulator.pipelines.binned import binned
+from simulator.scenes.camera import LookAt
+from simulator.scenes.scene import Mesh, Scene
+from simulator.stages.zhang2025.coarse_rasterizer import DEPTH_STEPS
+from simulator.stages.zhang2025.fine_rasterizer import quad_mask
+from simulator.stages.zhang2025.primitive_compaction import most_triangles
+from tests import naive_textured as naive
+from tests.test_ru_pipelines import soup
+
+WIDTH, HEIGHT = 141, 131  # two bins each way, no multiples of a tile
+SIMT = Simt()
+CAMERA = LookAt((0, 0, 4), (0, 0, 0), fov_degrees=45)
+NEAR_EDGE = 3e-4  # his edge functions lose bits in their constant
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return soup()
+
+
+@pytest.fixture(scope="module")
+def matrix():
+    return CAMERA.matrix(WIDTH, HEIGHT)
+
+
+def draw(scene, matrix, **options):
+    return binned(scene, matrix, WIDTH, HEIGHT, SIMT, **options)
+
+
+def work(frame, stage):
+    return next(w for w in frame.works if w.stage == stage)
+
+
+def opaque_colors(scene, seed=2):
+    """Flat colours a triangle, no texture, no light."""
+    count = len(scene.mesh.triangles)
+    colors = np.repeat(np.random.default_rng(seed).uniform(0.1, 1, (count, 4)), 3, axis=0).astype(np.float32)
+    normals = np.zeros((3 * count, 3), np.float32)
+    return replace(scene, mesh=replace(scene.mesh, colors=colors, normals=normals, texture_ids=None, textures=()))
+
+
+@pytest.mark.parametrize("culling", [True, False])
+def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, culling):
+    frame = draw(scene, matrix, culling=culling)
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
+    ids, depth, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT, culling=culling)
+    sure = doubt > NEAR_EDGE
+    assert sure.mean() > 0.9
+    assert (frame.triangle_ids[sure] == ids[sure]).all()
+    drawn = sure & (ids >= 0)
+    assert frame.depth[drawn] == pytest.approx(depth[drawn], abs=1e-5)
+
+
+def test_api_order_is_drawing_one_triangle_after_another(scene, matrix):
+    scene = opaque_colors(scene)
+    whole = draw(scene, matrix, fragments_a_pixel=0)
+    image, nearest = np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.full((HEIGHT, WIDTH), 2**25)
+    for t in range(len(scene.mesh.triangles)):
+        alone = draw(replace(scene, mesh=replace(scene.mesh, triangles=scene.mesh.triangles[t : t + 1])), matrix)
+        z = np.rint(alone.depth.astype(np.float64) * float(DEPTH_STEPS)).astype(np.int64)
+        wins = (alone.triangle_ids >= 0) & (z <= nearest)
+        image[wins], nearest[wins] = alone.image[wins], z[wins]
+    assert (whole.image == image).all()
+
+
+def test_the_later_of_two_equal_triangles_is_seen(matrix):
+    points = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [0, 1, 0, 1]] * 2, np.float32)
+    scene = Scene("twice", mesh=Mesh(points, np.arange(6, dtype=np.int32).reshape(2, 3)))
+    ids = draw(scene, matrix).triangle_ids
+    assert set(np.unique(ids)) == {-1, 1}
+
+
+def test_transparency_is_sorting_the_fragments_of_each_pixel(scene, matrix):
+    scene = opaque_colors(scene)
+    frame = draw(scene, matrix, order="oit", fragments_a_pixel=0)
+    layers = []
+    for t in range(len(scene.mesh.triangles)):
+        alone = draw(replace(scene, mesh=replace(scene.mesh, triangles=scene.mesh.triangles[t : t + 1])), matrix)
+        layers.append((alone.depth, alone.triangle_ids >= 0, scene.mesh.colors[3 * t]))
+    for y, x in np.argwhere(frame.triangle_ids >= 0)[::29]:
+        fragments = [(d[y, x], t, c) for t, (d, hit, c) in enumerate(layers) if hit[y, x]]
+        assert frame.image[y, x] == pytest.approx(255.0 * naive.over(fragments), abs=1.01)
+
+
+def test_fragments_beyond_the_kept_ones_are_counted(scene, matrix):
+    every = draw(scene, matrix, order="oit", fragments_a_pixel=0, culling=False)
+    few = draw(scene, matrix, order="oit", fragments_a_pixel=2, culling=False)
+    assert every.facts["fragments lost beyond the kept ones"] == 0
+    kept = work(few, "ROP").counts()
+    assert kept["LOST"] + kept["BLEND_LANES"] == work(every, "ROP").counts()["BLEND_LANES"]
+    assert kept["LOST"] > 0
+
+
+def test_clipping_changes_nothing_inside(matrix):
+    """A triangle that leaves the view on all sides covers every pixel, and its attributes stay exact."""
+    corners = np.array([[-90, -90, 0, 1], [90, -90, 0, 1], [0, 120, 0, 1]], np.float32)
+    frame = draw(Scene("wall", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32))), matrix)
+    assert (frame.triangle_ids == 0).mean() > 0.999  # his planes can leave a hole on a seam of the fan
+    assert work(frame, "PrimitiveAssembly").counts()["CLIPPED"] == 1
+
+
+def test_a_triangle_through_the_eye_plane_is_clipped(matrix):
+    corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [0, 0.5, 9, 1]], np.float32)
+    frame = draw(Scene("ramp", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32))), matrix, culling=False)
+    assert (frame.triangle_ids == 0).any()
+
+
+def test_hi_z_rejects_nothing_visible(matrix):
+    far = soup(seed=5, count=30).mesh
+    wall = np.array([[-9, -9, 2, 1], [9, -9, 2, 1], [0, 12, 2, 1]], np.float32)
+    mesh = Mesh(np.concatenate([wall, far.positions]), np.arange(93, dtype=np.int32).reshape(-1, 3))
+    frame = draw(Scene("hidden", mesh=mesh), matrix)
+    screen = naive.project(mesh.positions, matrix, WIDTH, HEIGHT)
+    ids, _, doubt = naive.draw(screen, mesh.triangles, WIDTH, HEIGHT)
+    assert (frame.triangle_ids == ids)[doubt > NEAR_EDGE].all()
+
+
+def test_a_quad_is_live_if_one_pixel_is():
+    assert quad_mask(np.uint64(1) << np.uint64(63)) == 1 << 15
+    assert quad_mask(np.uint64(0x0101)) == 1
+
+
+def test_every_covered_fragment_is_shaded_in_a_quad(scene, matrix):
+    frame = draw(scene, matrix)
+    counts = work(frame, "PixelShader").counts()
+    assert counts["WARP_LANES"] == 4 * frame.facts["quads"] == counts["ATOMIC_LANES"]
+
+
+@pytest.mark.parametrize("options", [{"texture_layout": "rows"}, {"optimized": False}])
+def test_layout_and_optimization_change_no_pixel(scene, matrix, options):
+    assert (draw(scene, matrix).image == draw(scene, matrix, **options).image).all()
+
+
+def test_the_tiled_layout_moves_less_along_columns(matrix):
+    """A texture seen turned by 90 degrees: rows of the screen run along its columns."""
+    corners = np.array([[-2, -2, 0, 1], [2, -2, 0, 1], [2, 2, 0, 1], [-2, 2, 0, 1]], np.float32)
+    uvs = np.array([[0, 0], [0, 1], [1, 1], [1, 0]], np.float32)
+    texture = np.full((256, 256, 4), 200, np.uint8)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    mesh = Mesh(corners, triangles, uvs=uvs, texture_ids=np.zeros(2, np.int32), textures=(texture,))
+    moved = [
+        work(draw(Scene("turned", mesh=mesh), matrix, texture_layout=layout), "PixelShader").counts()["TEXTURE_BYTES"]
+        for layout in ("tiled", "rows")
+    ]
+    assert moved[0] < moved[1]
+
+
+def test_compaction_keeps_what_assembly_did_not_cull(scene, matrix):
+    frame = draw(scene, matrix)
+    assert work(frame, "PrimitiveCompaction").counts()["KEPT"] == frame.facts["primitives after culling"]
+
+
+def test_the_machine_limits_the_cooperative_launch():
+    machine = load_machine("ga104")
+    assert most_triangles(machine) == 48 * 6 * 256 // 4  # six blocks of 256 threads and 40 registers an SM
+
+
+def test_a_picture_beyond_the_bins_is_refused(scene):
+    with pytest.raises(TilestampError, match="2048"):
+        binned(scene, CAMERA.matrix(2100, 100), 2100, 100, SIMT)
+
+
+@pytest.mark.parametrize(
+    "options", [{"order": "any"}, {"texture_layout": "morton"}, {"fragments_a_pixel": -1}, {"opacity": 2.0}]
+)
+def test_a_bad_option_is_refused(scene, matrix, options):
+    with pytest.raises(TilestampError):
+        draw(scene, matrix, **options)
+
+
+@pytest.mark.parametrize("optimized", [True, False])
+def test_every_kernel_has_a_price(scene, matrix, optimized):
+    mix = load_mix("binned", "8.6")
+    for w in draw(scene, matrix, optimized=optimized).works:
+        assert mix.launch(w, 32).events.sum() > 0
+
+
+def test_a_graph_takes_its_longest_path():
+    nodes = [Node("a", 5), Node("b", 1), Node("c", 2, ("a", "b"))]
+    assert as_graph(nodes, 1.0, 0.0).path == ("a", "c")
+    assert as_graph(nodes, 1.0, 0.0).gpu_us == 9.0
+    assert on_stream(nodes, 1.0, 2.0).gpu_us == 11.0
+    assert on_stream(nodes, 1.0, 2.0).cpu_us == 13.0
