@@ -1,7 +1,7 @@
-"""Stamps, lanes across polygons, and bit masks in modelled time: which wins at which polygon area, and what bounds each.
+"""Stamps, lanes across polygons and bit masks in modelled time: which wins at which area, and what bounds each.
 
-Patches of 16 x 16 squares at random places and rotations, a million pixels of polygons or 100,000 polygons, whichever is
-less. Instruction mixes are assumed (counted by hand), so differences of some ten percent say nothing.
+Patches of 16 x 16 squares at random places and rotations: a million pixels of polygons or 100,000 polygons, the less
+of the two. Instruction mixes are assumed (counted by hand), so differences of some ten percent say nothing.
 """
 
 from collections.abc import Callable

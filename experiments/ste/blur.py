@@ -68,7 +68,7 @@ def _patterns() -> dict[str, BlurPattern]:
 
 
 def _moving(way: float, radius: float) -> MovingMicropolygons:
-    """Unit squares that each move ``way`` pixels in a direction of their own."""
+    """Make unit squares that each move ``way`` pixels in a direction of their own."""
     angle = np.random.default_rng(3).random(COUNT) * 2 * np.pi
     step = way * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return moved(random_polygons("square", 1.0, COUNT, 9, PIXELS), step[:, None, :], radius)
@@ -97,14 +97,15 @@ def _measure(way: float, radius: float) -> list[dict[str, Any]]:
 
 
 def _crossing(table: pd.DataFrame, radius: float) -> str:
-    """The way at which interleaving becomes the cheaper, between measured points."""
+    """Find the way at which interleaving becomes the cheaper, between measured points."""
     cost = table.pivot_table(index="way", columns="algorithm", values="cost")
     cheaper = cost.interval > cost.interleaved
     text = f"Circles of {radius:g} pixels: "
     if cheaper.all() or not cheaper.any():
         return f"{text}{'interleaving' if cheaper.all() else 'interval'} is the cheaper at every way measured."
-    way = float(cheaper.idxmax())
-    return f"{text}interleaving becomes the cheaper between {max(w for w in WAYS if w < way):g} and {way:g} pixels of motion."
+    way = min(w for w in WAYS if cheaper[w])
+    before = max(w for w in WAYS if w < way)
+    return f"{text}interleaving becomes the cheaper between {before:g} and {way:g} pixels of motion."
 
 
 def _plot(table: pd.DataFrame, path: Any) -> None:
@@ -122,7 +123,7 @@ def _plot(table: pd.DataFrame, path: Any) -> None:
 
 
 def _maps(path: Any) -> None:
-    """Tests per pixel at 16 pixels of motion."""
+    """Map the tests per pixel at 16 pixels of motion."""
     maps = {}
     for name, pattern in _patterns().items():
         samples = blur_samples(PIXELS, PIXELS, pattern)

@@ -63,7 +63,7 @@ def run(progress: Callable[[str], None]) -> Result:
         for r in rows
     ]
     notes = [
-        f"The closed form lies inside the cell's own 95 % interval in {each} of {len(table)} cells (19 of 20 expected).",
+        f"The closed form lies in the cell's own 95 % interval in {each} of {len(table)} cells (19 of 20 expected).",
         f"It lies inside the 95 % interval that holds for all cells together (Bonferroni) in {all_} of them.",
         "The 'published' column is the closed form of the stored facts, derived there, not a published measurement.",
     ]

@@ -47,7 +47,7 @@ def run(progress: Callable[[str], None]) -> Result:
     notes = [
         f"A square of {_area_at(QUOTED / 100):.2f} pixels gives 2 % with 8x8-pixel stamps (closed form).",
         "The quoted 2 % is a prediction in the literature, so no error against it is averaged.",
-        "Hits count every covered sample, hidden ones too; stamps of all micropolygons' boxes, no bound on a tile's list.",
+        "Hits count every covered sample, hidden ones too; every stamp that a micropolygon's box touches is tested.",
     ]
     figure = Figure("area", lambda path: _plot(sweep, path))
     source = "Eisenacher & Loop 2010, introduction and section 6"

@@ -1,0 +1,41 @@
+"""Speed of counting and subdividing: 4 M microquads at 1600x1200 (aim: under 0.5 s), a cube of 7 rounds (under 1 s)."""
+
+import numpy as np
+import pytest
+
+from experiments.ste.setting import cube
+from simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
+from simulator.stages.micropolygons import Micropolygons
+from simulator.stages.sample_positions import sample_positions
+from simulator.stages.stamps import stamp_shape
+from simulator.stages.stamps_count import count_tests
+
+MICROQUADS = 4_000_000
+WIDTH, HEIGHT = 1600, 1200
+
+
+@pytest.fixture(scope="module")
+def microquads():
+    """Random quads of half a pixel."""
+    rng = np.random.default_rng(1)
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * 0.7
+    vertices = np.zeros((MICROQUADS, 4, 3), np.float32)
+    vertices[:, :, :2] = rng.random((MICROQUADS, 1, 2)) * [WIDTH, HEIGHT] + corners
+    return Micropolygons(vertices, np.arange(MICROQUADS, dtype=np.int32), np.zeros(MICROQUADS, np.uint8))
+
+
+@pytest.mark.parametrize("touch", ["box", "polygon"])
+@pytest.mark.parametrize("stamp", [1, 2, 4, 8, 16])
+def test_count_4m_microquads(benchmark, microquads, stamp, touch):
+    benchmark(count_tests, microquads, WIDTH, HEIGHT, sample_positions(1), stamp_shape(stamp, touch))
+
+
+def test_subdivide_a_cube_seven_times(benchmark):
+    benchmark(lambda: limit_positions(subdivide(surface_of(cube().cage), 7)))
+
+
+def test_subdivide_bigguy_to_sub_pixel_size(benchmark, shared):
+    from simulator.scenes.quad_cage import read_cage
+
+    surface = surface_of(read_cage(shared / "scenes" / "cages" / "bigguy.obj"))
+    benchmark(lambda: limit_positions(subdivide(surface, 5)))

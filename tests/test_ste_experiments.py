@@ -1,0 +1,103 @@
+"""The experiments on sample test efficiency, on small inputs: they find what they say, and the pipelines run."""
+
+import numpy as np
+import pytest
+
+from experiments.ste import algorithms, aspect, blur, closed_form, eisenacher
+from experiments.ste.setting import cube, mean_area, random_polygons, student
+from models.simt import Simt
+from simulator.pipelines import load_pipeline, pipeline_options
+from simulator.scenes import load_scene, read_camera
+
+
+@pytest.mark.parametrize(
+    ("shape", "area", "stamp", "touch", "percent"),
+    [
+        ("square", 1.0, 1, "polygon", 22.0),
+        ("square", 1.0, 1, "box", 19.3),
+        ("square", 2.0, 8, "box", 2.08),
+        ("triangle", 10.0, 4, "box", 13.6),
+        ("triangle", 0.25, 2, "polygon", 3.5),
+    ],
+)
+def test_the_closed_form_is_the_stored_table(shape, area, stamp, touch, percent):
+    assert 100 * closed_form.expected(shape, area, stamp, touch) == pytest.approx(percent, rel=0.02)
+
+
+def test_measured_ste_agrees_with_the_closed_form(monkeypatch):
+    monkeypatch.setattr(closed_form, "POLYGONS", 500)
+    cells = closed_form._cells("triangle", 2.0)
+    assert all(cell["inside_together"] for cell in cells)
+    assert len(cells) == 8
+
+
+@pytest.mark.parametrize(("probability", "quantile"), [(0.975, 2.0227), (0.9995, 3.5581)])
+def test_students_quantiles_are_those_of_the_tables(probability, quantile):
+    assert student(probability, 39) == pytest.approx(quantile, rel=1e-3)
+
+
+@pytest.mark.parametrize("shape", ["square", "triangle"])
+def test_random_polygons_have_their_area(shape):
+    assert mean_area(random_polygons(shape, 2.5, 100, 1)) == pytest.approx(2.5, rel=1e-3)
+
+
+def test_two_percent_of_an_8x8_stamp_is_a_square_of_two_pixels():
+    assert eisenacher._area_at(0.02) == pytest.approx(1.92, abs=0.1)
+
+
+def test_the_mask_gains_less_on_narrow_polygons():
+    assert aspect._measure(0.5, 32)["gain"] < aspect._measure(0.5, 1)["gain"]
+
+
+def test_interleaving_wins_at_long_motion_and_not_without():
+    cost = {way: {r["algorithm"]: r["cost"] for r in blur._measure(way, 0.0)} for way in (0.0, 64.0)}
+    assert cost[64.0]["interleaved"] < cost[64.0]["interval"]
+    assert cost[0.0]["interleaved"] > cost[0.0]["interval"]
+
+
+def test_patches_of_squares_have_their_area_and_their_patches():
+    polygons = algorithms.patches_of_squares(8.0)
+    assert mean_area(polygons) == pytest.approx(8.0, rel=1e-2)
+    assert (np.bincount(polygons.patch) == algorithms.GRID**2).all()
+
+
+def test_time_of_every_algorithm_has_a_bound(monkeypatch):
+    monkeypatch.setattr(algorithms, "MOST_POLYGONS", 2000)
+    polygons = algorithms.patches_of_squares(1.0)
+    rows = [algorithms._timed(polygons, 1.0, name, "gtx480") for name in algorithms.ALGORITHMS]
+    assert all(row["ns"] > 0 and row["bound"] for row in rows)
+
+
+def test_a_subdivided_cube_fits_its_window():
+    polygons = cube().on_screen(3, 64, 48)
+    assert polygons.vertices[..., 0].min() > 0
+    assert polygons.vertices[..., 0].max() < 64
+    assert len(polygons.patch) == 2 * 6 * 4**3
+
+
+def draw(name, **options):
+    scene = load_scene("teapot")
+    matrix = read_camera("default", scene).matrix(80, 60)
+    return load_pipeline(name)(scene, matrix, 80, 60, Simt(), **options)
+
+
+def test_exact_pipelines_draw_the_same_picture():
+    frames = [
+        draw("stamps", stamp=2, touch="polygon"),
+        draw("across-polygons", packing="repacked"),
+        draw("bit-mask", mask="depth"),
+    ]
+    for frame in frames[1:]:
+        assert (frame.maps["micropolygons"] == frames[0].maps["micropolygons"]).all()
+        assert (frame.image == frames[0].image).all()
+
+
+def test_the_plain_mask_says_how_many_pixels_are_wrong():
+    plain, exact = draw("bit-mask"), draw("across-polygons")
+    wrong = int((plain.maps["micropolygons"] != exact.maps["micropolygons"]).sum())
+    assert plain.facts["wrong_pixels"] == wrong > 0
+
+
+@pytest.mark.parametrize("name", ["stamps", "across-polygons", "bit-mask"])
+def test_every_pipeline_takes_samples_from_a_file(name):
+    assert {"spp", "positions", "edge"} <= set(pipeline_options(name))
