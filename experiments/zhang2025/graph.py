@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from experiments.result import Cell, Result
-from experiments.zhang2025.kernels import kernel_times
+from experiments.result import Cell, Result, Status
 from experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, published
 from models.launch_graph import Node, as_graph, on_stream
 from models.machine import Machine, load_machine
@@ -33,9 +32,8 @@ ORDER = (
     "CoarseRasterizer", "FineRasterizer", "PixelShader", "ROP", "StreamingToFrameBuffer",
 )  # fmt: skip
 WAITS = {"PrimitiveBinning": "PrimitiveCompaction"}  # instead of the stage before
-MAP_US = 560.0  # to map and unmap the window's buffer: fitted on the CPU time of the stream
-BLOCKING_US = 12.0  # a copy back whose size the next launch needs: assumed; the stream version has three
-COPIES_BACK = 3
+CALLS = len(CLEARS) + len(ORDER) + 3  # on the stream, with three copies back that size the next launch
+FITTED = {("gpu_time_rasterize_pipeline", "default_stream"), ("gpu_time", "cuda_graph")}  # a call, a mapping
 
 
 def nodes(times: dict[str, float], machine: Machine) -> list[Node]:
@@ -51,6 +49,10 @@ def nodes(times: dict[str, float], machine: Machine) -> list[Node]:
     return clears + stages
 
 
+def _status(metric: str, column: str) -> Status:
+    return "fitted" if (metric, column) in FITTED else "predicted"
+
+
 def run(progress: Callable[[str], None]) -> Result:
     """Price the frame both ways."""
     scene = bunny()
@@ -59,19 +61,21 @@ def run(progress: Callable[[str], None]) -> Result:
         return Result("zhang2025/graph", "Stream against graph", SOURCE, [], [], [], [warning])
     machine = load_machine(MACHINE)
     progress(MACHINE)
-    frame = nodes(kernel_times(draw(scene, MACHINE)), machine)
+    stages = draw(scene, MACHINE).stages.milliseconds
+    frame = nodes({str(stage): 1e3 * float(ms) for stage, ms in stages.items()}, machine)
     stream = on_stream(frame, machine.launch.stream_us, machine.launch.sync_us)
     graph = as_graph(frame, machine.launch.graph_us, machine.launch.sync_us)
     asked = published("graph").set_index("metric")
-    copies = COPIES_BACK * BLOCKING_US
+    wait = 1e3 * float(asked.loc["gpu_time_rasterize_pipeline", "default_stream_ms"]) - stream.gpu_us
+    mapping = 1e3 * float(asked.loc["gpu_time", "cuda_graph_ms"]) - graph.gpu_us
     pairs = {
-        "gpu_time_rasterize_pipeline": (stream.gpu_us + copies, graph.gpu_us),
-        "gpu_time": (stream.gpu_us + copies, graph.gpu_us + MAP_US),
-        "cpu_time": (stream.cpu_us + copies + MAP_US, graph.cpu_us + MAP_US),
-        "total_frame_time": (stream.cpu_us + copies + MAP_US, graph.cpu_us + MAP_US),
+        "gpu_time_rasterize_pipeline": (stream.gpu_us + wait, graph.gpu_us),
+        "gpu_time": (stream.gpu_us + wait, graph.gpu_us + mapping),
+        "cpu_time": (stream.cpu_us + wait + mapping, graph.cpu_us + mapping),
+        "total_frame_time": (stream.cpu_us + wait + mapping, graph.cpu_us + mapping),
     }
     cells = [
-        Cell(metric, column, "ms", float(asked.loc[metric, f"{column}_ms"]), us / 1e3, aim=0.5)
+        Cell(metric, column, "ms", float(asked.loc[metric, f"{column}_ms"]), us / 1e3, _status(metric, column), aim=0.5)
         for metric, both in pairs.items()
         for column, us in zip(("default_stream", "cuda_graph"), both, strict=True)
     ]
@@ -86,6 +90,7 @@ def run(progress: Callable[[str], None]) -> Result:
         f"Critical path of the graph: {' > '.join(graph.path)}.",
         f"Clears take {cleared / 1e3:.2f} ms of the stream; side by side they still share one memory, which this graph "
         "does not model, so its clears are too cheap where several overlap.",
-        f"Mapping the window's buffer is assumed to take {MAP_US:.0f} us; he says that it leaves the GPU idle.",
+        f"Fitted: {wait / CALLS:.0f} us that each of {CALLS} calls on the stream keeps the GPU idle beyond the machine's "
+        f"launch time, and {mapping:.0f} us to map and unmap the window's buffer, which he says leaves the GPU idle.",
     ]
     return Result("zhang2025/graph", "Stream against graph", SOURCE, cells, [], notes, tables={"graph": table})

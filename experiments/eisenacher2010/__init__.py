@@ -1,0 +1,1 @@
+"""Eisenacher & Loop 2010, "Data-parallel Micropolygon Rasterization": tables 1 to 3, figure 4, and its claims."""

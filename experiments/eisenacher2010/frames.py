@@ -1,0 +1,67 @@
+"""The paper's frames: its models from its views on its machine, each executed once."""
+
+from functools import cache
+
+from simulator.run import Run
+from simulator.scenes.library import scene_or_stand_in
+from simulator.scenes.scene import Scene
+from simulator.simulate import simulate
+
+SOURCE = "Eisenacher & Loop, Data-parallel Micropolygon Rasterization, Eurographics 2010 short papers"
+MACHINE = "gtx280"
+OVERHEAD_MS = 4.6  # published: table 3, system overhead at 1600x1200
+OVERHEAD_PIXELS = 1600 * 1200  # assumed: the overhead is the copy of the picture to the screen, so it goes with the pixels
+
+
+@cache
+def model(name: str) -> Scene:
+    """The model, or a stand-in of about as many patches where the file is missing."""
+    return scene_or_stand_in(name)
+
+
+@cache
+def frame(
+    name: str = "killeroo",
+    width: int = 1600,
+    height: int = 1200,
+    *,
+    tile: int = 8,
+    spp: int = 1,
+    bound: float = 4,
+    view: str = "default",
+    box_tests: bool = True,
+    edges: str = "computed",
+    hybrid: bool = False,
+) -> Run:
+    """One frame of the paper; ``pixel_extent`` is the reading of its bound that fits its counts (``scenes/views.py``)."""
+    scene = model(name)
+    return simulate(
+        scene,
+        "micropolygon",
+        MACHINE,
+        width=width,
+        height=height,
+        camera=view if view in scene.views else "default",
+        tile=tile,
+        spp=spp,
+        bound=bound,
+        bound_rule="pixel_extent",
+        box_tests=box_tests,
+        edges=edges,
+        hybrid=hybrid,
+    )
+
+
+def overhead_ms(run: Run) -> float:
+    """What the paper calls system overhead, scaled by the pixels."""
+    return OVERHEAD_MS * run.width * run.height / OVERHEAD_PIXELS
+
+
+def stand_in_warnings(*names: str) -> list[str]:
+    """What is to be said where models are missing."""
+    return [f"STAND-IN, not the paper's model: {model(name).note}" for name in names if model(name).note]
+
+
+def stage_ms(run: Run, *stages: str) -> float:
+    """Milliseconds of some stages."""
+    return float(run.stages.loc[list(stages), "milliseconds"].sum())

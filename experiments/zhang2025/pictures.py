@@ -1,0 +1,70 @@
+"""Features off and on, side by side: perspective correction, filtering, ambient occlusion, transparency, the write race."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.result import Cell, Figure, Result
+from models.errors import TilestampError
+from models.machine import load_machine
+from reports.style import figure
+from simulator.frame import Frame
+from simulator.pipelines import load_pipeline
+from simulator.scenes.camera import LookAt
+from simulator.scenes.library import load_scene
+
+SCENE = "CesiumMilkTruck"
+SIZE = 512  # pixels
+CAMERA = LookAt((3.2, 2.2, 4.2), (0.0, 1.2, 0.0), fov_degrees=45.0)
+PAIRS: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
+    "perspective correction": ("tiled", "ga104", {"perspective": False}, {"perspective": True}),
+    "bilinear filtering": ("tiled", "ga104", {"texture_filter": "nearest"}, {"texture_filter": "bilinear"}),
+    "trilinear filtering": ("binned", "ga104", {"texture_filter": "bilinear"}, {"texture_filter": "trilinear"}),
+    "ambient occlusion": ("tiled", "ga104", {"ssao": False}, {"ssao": True}),
+    "transparency": ("binned", "ga104", {}, {"order": "oit", "opacity": 0.5, "culling": False}),
+    "protected writes": ("per-primitive", "ga104", {"race": True}, {"race": False}),
+}
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Draw the truck with each feature off and on."""
+    source = "Ru 2016 and Zhang 2025, pictures without figures"
+    try:
+        scene = load_scene(SCENE)
+    except TilestampError as error:
+        return Result("zhang2025/pictures", "Features off and on", source, [], [], [], [str(error)])
+    matrix = CAMERA.matrix(SIZE, SIZE)
+    cells, figures = [], []
+    for name, (pipeline, machine, off, on) in PAIRS.items():
+        progress(name)
+        simt = load_machine(machine).simt
+        frames = [load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, **options) for options in (off, on)]
+        cells += _difference(name, *frames)
+        figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
+    notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]
+    return Result("zhang2025/pictures", "Features off and on", source, cells, figures, notes)
+
+
+def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:
+    """How much a feature changes the picture."""
+    change = on.image.astype(np.float64) - off.image.astype(np.float64)
+    rms = float(np.sqrt((change**2).mean()))
+    share = float((change != 0.0).any(axis=2).mean())
+    return [
+        Cell(name, "RMS difference", "of 255", None, rms, "reported"),
+        Cell(name, "pixels that change", "%", None, 100.0 * share, "reported"),
+    ]
+
+
+def _side_by_side(name: str, off: NDArray[np.uint8], on: NDArray[np.uint8]) -> Callable[[Path], None]:
+    """A figure with both pictures."""
+
+    def draw(path: Path) -> None:
+        with figure(path, f"{name}: off, on", figsize=(9.6, 5.0)) as axes:
+            axes.imshow(np.concatenate([off, on], axis=1))
+            axes.axis("off")
+
+    return draw
