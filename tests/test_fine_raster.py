@@ -101,7 +101,7 @@ def test_pictures_are_the_plain_minimum_of_each_sample(seed, release, samples):
 
 
 def grid(seed, n=6, shake=0.8):
-    """A watertight mesh over more than the viewport: a grid with its inner vertices moved about."""
+    """Make a watertight mesh over more than the viewport: a grid with its inner vertices moved about."""
     rng = np.random.default_rng(seed)
     x, y = np.meshgrid(np.linspace(-1.5, 1.5, n + 1), np.linspace(-1.5, 1.5, n + 1))
     inner = np.zeros((n + 1, n + 1))

@@ -35,7 +35,8 @@ def frame_image(
         weights = np.concatenate([weights, 1 - weights.sum(axis=-1, keepdims=True)], axis=-1)
         corners = colors[triangles[np.maximum(ids, 0)], :3]
         shaded = np.einsum("hwk,hwkc->hwc", weights, corners) * (ids >= 0)[..., None]
-        return np.clip(shaded * 255 + 0.5, 0, 255).astype(np.uint8)[::-1]
+        picture: NDArray[np.uint8] = np.clip(shaded * 255 + 0.5, 0, 255).astype(np.uint8)
+        return picture[::-1]
     packed = buffers.color[:, :height, :width]
     channels = [((packed >> np.uint32(8 * c)) & np.uint32(255)).mean(axis=0) for c in range(3)]
     return (np.stack(channels, axis=-1) + 0.5).astype(np.uint8)[::-1]

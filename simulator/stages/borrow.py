@@ -12,7 +12,7 @@ from numba.extending import intrinsic, overload
 
 
 def borrow(arrays: Any) -> Any:
-    """View of an array, or of a tuple of arrays, that the caller keeps alive; interpreted code gets it back as it is."""
+    """View an array, or a tuple of arrays, that the caller keeps alive; interpreted code gets it back as it is."""
     return arrays
 
 
@@ -38,5 +38,5 @@ def _borrow(_context: Any, arrays: Any) -> Any:
 
 
 @overload(borrow)
-def _borrow_compiled(arrays):  # noqa: ANN001, ANN202 - numba compares the signatures, annotations included
-    return lambda arrays: _borrow(arrays)
+def _borrow_compiled(arrays):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001 - numba compares signatures
+    return lambda arrays: _borrow(arrays)  # noqa: PLW0108 - numba needs a function

@@ -1,5 +1,7 @@
 """Clipping one triangle against the view frustum, in barycentric coordinates (cudaraster 1.1, triangle setup)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -10,12 +12,12 @@ _ONE = np.float32(1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _plane_value(plane, bary, i):
+def _plane_value(plane: Any, bary: Any, i: int) -> Any:
     return fma(plane[2], bary[i, 1], fma(plane[1], bary[i, 0], plane[0]))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _clip_plane(plane, source, target, n):
+def _clip_plane(plane: Any, source: Any, target: Any, n: int) -> Any:
     """Keep the part of an n-gon where the plane is not negative; returns its number of vertices."""
     if n < 3:
         return 0
@@ -39,7 +41,7 @@ def _clip_plane(plane, source, target, n):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def clip_triangle(corners, polygon, spare, plane, steps):
+def clip_triangle(corners: Any, polygon: Any, spare: Any, plane: Any, steps: Any) -> Any:
     """Clip a triangle whose corners are clip positions; an axis is clipped only where a corner lies outside it.
 
     Parameters
@@ -82,7 +84,7 @@ def clip_triangle(corners, polygon, spare, plane, steps):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def polygon_component(corners, polygon, i, c):
+def polygon_component(corners: Any, polygon: Any, i: int, c: int) -> Any:
     """Component c of the clip position of vertex i of the clipped polygon."""
     first = corners[1, c] - corners[0, c]
     second = corners[2, c] - corners[0, c]

@@ -4,6 +4,8 @@ The original looks masks up in a table of edges; the table gives exactly the int
 pixel (x, y) of the tile at bit 8 * y + 7 - x, so that ascending bits are the order in which fragments are drawn.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -13,13 +15,13 @@ SAMPLE_COLUMN = np.array([[0] * 8, [0, 1] + [0] * 6, [1, 3, 0, 2] + [0] * 4, [7,
 
 
 @njit(cache=True, nogil=True)
-def _exclusive(dx, dy):
+def _exclusive(dx: int, dy: int) -> Any:
     """1 where a sample exactly on the edge is outside (right edges, and upper horizontal ones), else 0."""
     return 1 if dy > 0 or (dy == 0 and dx <= 0) else 0
 
 
 @njit(cache=True, nogil=True)
-def _first_value(header, k, x, y):
+def _first_value(header: Any, k: int, x: int, y: int) -> Any:
     """Edge k -> k + 1 of the triangle at (x, y), less its threshold; and the edge's direction. Negative: outside."""
     m = (k + 1) % 3
     px, py = np.int64(header[2 * k]), np.int64(header[2 * k + 1])
@@ -28,7 +30,7 @@ def _first_value(header, k, x, y):
 
 
 @njit(cache=True, nogil=True)
-def pixel_mask(header, left, bottom):
+def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels of a tile whose centre is covered.
 
     Parameters
@@ -52,13 +54,13 @@ def pixel_mask(header, left, bottom):
 
 
 @njit(cache=True, nogil=True)
-def square_mask(header, left, bottom):
+def square_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels whose square may be touched: the conservative mask of several samples a pixel."""
     return _box_mask(header, left, bottom, 0, TILE - 1, 0, TILE - 1, 8)
 
 
 @njit(cache=True, nogil=True)
-def _box_mask(header, left, bottom, first, last, low, high, margin):
+def _box_mask(header: Any, left: int, bottom: int, first: int, last: int, low: int, high: int, margin: int) -> Any:
     """Mask of the pixels in a box, with every edge moved outwards by ``margin`` in both axes."""
     mask = np.uint64(0)
     if first > last or low > high:
@@ -86,8 +88,8 @@ def _box_mask(header, left, bottom, first, last, low, high, margin):
 
 
 @njit(cache=True, nogil=True)
-def sample_mask(header, x, y, log_samples):
-    """Samples of one pixel that are covered.
+def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
+    """Find the samples of one pixel that are covered.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ def sample_mask(header, x, y, log_samples):
 
 
 @njit(cache=True, nogil=True)
-def centroid_sample(mask, log_samples):
+def centroid_sample(mask: Any, log_samples: int) -> Any:
     """Covered sample nearest to the centre; -1, the centre itself, where all or none are covered."""
     samples = 1 << log_samples
     best, nearest = -1, 1 << 30

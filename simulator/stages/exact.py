@@ -4,6 +4,8 @@ Each function is plain Python first, so that the kernels also run interpreted; c
 instruction through an overload.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic, overload
@@ -11,8 +13,8 @@ from numba.extending import intrinsic, overload
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding and taking it away rounds a double to even
 
 
-def fma(a, b, c):
-    """a * b + c with one rounding to float32 (two roundings, the first to odd, give the same)."""
+def fma(a: Any, b: Any, c: Any) -> Any:
+    """Multiply and add with one rounding to float32 (two roundings, the first to odd, give the same)."""
     product = float(a) * float(b)  # exact: 48 bits
     total = product + float(c)
     if not np.isfinite(total):
@@ -26,64 +28,64 @@ def fma(a, b, c):
 
 
 @intrinsic
-def _llvm_fma(_context, a, b, c):
-    def codegen(_context, builder, _signature, args):
+def _llvm_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
+    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.fma(*args)
 
     return types.float32(a, b, c), codegen
 
 
 @overload(fma, inline="never")
-def _fma(a, b, c):
+def _fma(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
     if a == b == c == types.float32:
-        return lambda a, b, c: _llvm_fma(a, b, c)
+        return lambda a, b, c: _llvm_fma(a, b, c)  # noqa: PLW0108 - numba needs a function
     return None
 
 
-def popcount(bits):
+def popcount(bits: Any) -> Any:
     """Set bits of a uint64."""
     return int(bits).bit_count()
 
 
 @intrinsic
-def _llvm_popcount(_context, bits):
-    def codegen(_context, builder, _signature, args):
+def _llvm_popcount(_context: Any, bits: Any) -> Any:
+    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.ctpop(args[0])
 
     return types.int64(bits), codegen
 
 
 @overload(popcount)
-def _popcount(bits):
-    return (lambda bits: _llvm_popcount(bits)) if bits == types.uint64 else None
+def _popcount(bits):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
+    return (lambda bits: _llvm_popcount(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 
-def lowest_bit(bits):
+def lowest_bit(bits: Any) -> Any:
     """Index of the lowest set bit of a uint64 that has one."""
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
 @intrinsic
-def _llvm_lowest_bit(_context, bits):
-    def codegen(_context, builder, _signature, args):
+def _llvm_lowest_bit(_context: Any, bits: Any) -> Any:
+    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.cttz(args[0], _true())
 
     return types.int64(bits), codegen
 
 
-def _true():  # the count for zero is left undefined
-    from llvmlite import ir
+def _true() -> Any:  # the count for zero is left undefined
+    from llvmlite import ir  # type: ignore[import-untyped]
 
     return ir.Constant(ir.IntType(1), 1)
 
 
 @overload(lowest_bit)
-def _lowest_bit(bits):
-    return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None
+def _lowest_bit(bits):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
+    return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 
 @njit(cache=True, nogil=True)
-def round_to_int32(value):
+def round_to_int32(value: Any) -> Any:
     """Float to int32: half to even, saturating, NaN to 0; returned as int64."""
     if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
         return np.int64(0)
@@ -92,7 +94,7 @@ def round_to_int32(value):
 
 
 @njit(cache=True, nogil=True)
-def round_to_uint32(value):
+def round_to_uint32(value: Any) -> Any:
     """Float to uint32: half to even, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
         return np.int64(0)
@@ -101,7 +103,7 @@ def round_to_uint32(value):
 
 
 @njit(cache=True, nogil=True)
-def truncate_to_uint32(value):
+def truncate_to_uint32(value: Any) -> Any:
     """Float to uint32 towards zero, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
         return np.int64(0)
@@ -109,18 +111,18 @@ def truncate_to_uint32(value):
 
 
 @njit(cache=True, nogil=True)
-def wrap_int32(value):
+def wrap_int32(value: Any) -> Any:
     """Low 32 bits as a signed number."""
     return ((value + 2147483648) & 4294967295) - 2147483648
 
 
 @njit(cache=True, nogil=True)
-def float_bits(value):
+def float_bits(value: Any) -> Any:
     """Bits of a float32 as a signed number."""
     return np.int64(np.float32(value).view(np.int32))
 
 
 @njit(cache=True, nogil=True)
-def biased_exponent(value):
+def biased_exponent(value: Any) -> Any:
     """Exponent field of a float32; 0 for anything negative."""
     return max(float_bits(value), 0) >> 23

@@ -4,20 +4,33 @@ A warp reads the tile's list 32 entries at a time, drops those behind the tile's
 the others, and draws their fragments 32 at a time, in input order: depth test, shading, conflict-free writes.
 """
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
+from models.launch import Stream
 from models.simt import Coalescing, Simt
 from simulator.stages.borrow import borrow
 from simulator.stages.fine_raster_multi import draw_tile_multi
-from simulator.stages.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent, corner, new_tile, start_tile
+from simulator.stages.fine_raster_queue import (
+    HEADER_BYTES,
+    PIXELS,
+    SEGMENT,
+    TILE,
+    Draw,
+    FineRasterEvent,
+    Tile,
+    corner,
+    new_tile,
+    start_tile,
+)
 from simulator.stages.fine_raster_single import draw_tile_single
 from simulator.stages.subtriangle import DEPTH_MAX, DEPTH_MIN
-from simulator.stages.triangle_setup import Release, Setup
+from simulator.stages.triangle_setup import Release
+from simulator.stages.triangle_setup_paths import Setup
 from simulator.work import Work
 
 Mode = Literal["depth", "blend", "depth-only", "color"]
@@ -44,7 +57,7 @@ class FrameBuffers(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _load_tile(buffers, draw, tile, x, y):
+def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
             at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
@@ -57,7 +70,7 @@ def _load_tile(buffers, draw, tile, x, y):
 
 
 @njit(cache=True, nogil=True)
-def _store_tile(buffers, draw, tile, x, y):
+def _store_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
             at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
@@ -67,7 +80,7 @@ def _store_tile(buffers, draw, tile, x, y):
 
 
 @njit(cache=True, nogil=True)
-def _count_tile(draw, row):
+def _count_tile(draw: Draw, row: Any) -> None:
     """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
 
     Surfaces are laid out in two dimensions, so that a row of a tile is one 32-byte segment on every machine. Samples
@@ -90,7 +103,18 @@ def _count_tile(draw, row):
 
 
 @njit(cache=True, nogil=True)
-def _draw_chunk(first, last, active, starts, entries, setup, colors, draw, buffers, table):
+def _draw_chunk(
+    first: int,
+    last: int,
+    active: Any,
+    starts: Any,
+    entries: Any,
+    setup: Setup,
+    colors: Any,
+    draw: Draw,
+    buffers: Any,
+    table: Any,
+) -> None:
     """Draw active tiles first..last-1, through arrays without reference counts."""
     tile = new_tile(1 << draw.log_samples)
     lists = borrow(starts), borrow(entries)
@@ -103,7 +127,18 @@ def _draw_chunk(first, last, active, starts, entries, setup, colors, draw, buffe
 
 
 @njit(cache=True, nogil=True)
-def _draw_tiles(first, last, active, lists, tile, setup, colors, buffers, draw, table):
+def _draw_tiles(
+    first: int,
+    last: int,
+    active: Any,
+    lists: Any,
+    tile: Tile,
+    setup: Setup,
+    colors: Any,
+    buffers: Any,
+    draw: Draw,
+    table: Any,
+) -> None:
     starts, entries = lists
     for a in range(first, last):
         t = active[a]
@@ -120,7 +155,9 @@ def _draw_tiles(first, last, active, lists, tile, setup, colors, buffers, draw, 
 
 
 @njit(cache=True, nogil=True)
-def draw_tile(setup, entries, colors, draw, tile, left, bottom, row):
+def draw_tile(
+    setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
+) -> None:
     """Draw the list of one tile."""
     if draw.log_samples > 0:
         draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
@@ -129,7 +166,9 @@ def draw_tile(setup, entries, colors, draw, tile, left, bottom, row):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _draw_all(active, starts, entries, setup, colors, draw, buffers, table):
+def _draw_all(
+    active: Any, starts: Any, entries: Any, setup: Setup, colors: Any, draw: Draw, buffers: Any, table: Any
+) -> None:
     for c in prange((active.size + _CHUNK - 1) // _CHUNK):
         last = min((c + 1) * _CHUNK, active.size)
         _draw_chunk(c * _CHUNK, last, active, starts, entries, setup, colors, draw, buffers, table)
@@ -232,7 +271,29 @@ def fine_raster(
             active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers, table if counting else None
         )  # fmt: skip
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
+    streams = _streams(table, setup, tile_entries, buffers, draw)
     work = Work(
-        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, dispatch="warp_queue"
+        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams
     )
     return buffers, work
+
+
+def _streams(
+    table: NDArray[np.int64], setup: Setup, entries: NDArray[np.int32], buffers: FrameBuffers, draw: Draw
+) -> tuple[Stream, ...]:
+    """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers."""
+    E = FineRasterEvent
+    total = table.sum(axis=0)
+    lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
+    headers = int(total[E.ENTRY_LANES]) * HEADER_BYTES
+    kept = int(setup.subtriangles.sum(dtype=np.int64))
+    pixels = 2 * buffers.depth.nbytes
+    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS << draw.log_samples
+    rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
+    return (
+        Stream("tile_queues", "load", lists, entries.nbytes),
+        Stream("headers", "load", headers, kept * HEADER_BYTES),
+        Stream("triangle_data", "load", rest, kept * setup.planes.shape[1] * 4),
+        Stream("pixels", "load", tiles, pixels if tiles else 0),
+        Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
+    )

@@ -1,23 +1,38 @@
-"""Fine raster at 2, 4 or 8 samples a pixel (cudaraster 1.1): a fragment is a pixel, its samples are tested on their own.
+"""Fine raster at 2, 4 or 8 samples a pixel (cudaraster 1.1): a fragment is a pixel, each sample is tested by itself.
 
 The tile in shared memory holds the farthest depth of each pixel; depths and colours of samples stay in memory.
 """
+
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 from simulator.stages.coverage import SAMPLE_COLUMN, centroid_sample, sample_mask
 from simulator.stages.exact import popcount
-from simulator.stages.fine_raster_queue import FRAGMENTS, PIXELS, UPDATE, ZMAX, refill, take, update_zmax
+from simulator.stages.fine_raster_queue import (
+    END,
+    FRAGMENTS,
+    NEXT,
+    PIXELS,
+    UPDATE,
+    ZMAX,
+    Draw,
+    Tile,
+    refill,
+    take,
+    update_zmax,
+)
 from simulator.stages.fine_raster_shade import blend_over, shade
 from simulator.stages.fine_raster_single import count_reads
 from simulator.stages.subtriangle import DEPTH_MAX
+from simulator.stages.triangle_setup_paths import Setup
 
 _LOW = 0xFFFFFFFF
 
 
 @njit(cache=True, nogil=True)
-def _hidden(record, misc, zmax, x, y, s):
+def _hidden(record: Any, misc: Any, zmax: Any, x: int, y: int, s: int) -> Any:
     """Whether a fragment lies behind all samples of its pixel, by the nearest depth that it could have there."""
     zx, zy, zb, slope = np.int64(record[0]), np.int64(record[1]), np.int64(record[2]), np.int64(record[3])
     nearest = (((zx + zy) << (s - 1)) + ((zx * x + zy * y) << s) + zb - slope) & _LOW
@@ -25,7 +40,7 @@ def _hidden(record, misc, zmax, x, y, s):
 
 
 @njit(cache=True, nogil=True)
-def _cull_fragments(setup, draw, tile, n, left, bottom, row):
+def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bottom: int, row: Any) -> Any:
     """Depth and sample tests of n fragments; survivors move to the front, their samples to ``tile.mask``."""
     kept = killed = hits = 0
     s = draw.log_samples
@@ -54,7 +69,7 @@ def _cull_fragments(setup, draw, tile, n, left, bottom, row):
 
 
 @njit(cache=True, nogil=True)
-def _write_sample(setup, draw, tile, sample, lane, color, x, y):
+def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, color: Any, x: int, y: int) -> Any:
     """Depth test and write of one sample of one survivor; True where it was written."""
     p, slot = tile.pixel[lane], tile.slot[lane]
     at, s = p + PIXELS * sample, draw.log_samples
@@ -72,7 +87,9 @@ def _write_sample(setup, draw, tile, sample, lane, color, x, y):
 
 
 @njit(cache=True, nogil=True)
-def _rop(setup, draw, tile, kept, sample, colors_of_lanes, column, line):
+def _rop(
+    setup: Setup, draw: Draw, tile: Tile, kept: int, sample: int, colors_of_lanes: Any, column: int, line: int
+) -> Any:
     """One sample of all survivors, in order; returns the writes, and the most that one pixel had."""
     writes = longest = 0
     for lane in range(kept):
@@ -90,7 +107,7 @@ def _rop(setup, draw, tile, kept, sample, colors_of_lanes, column, line):
 
 
 @njit(cache=True, nogil=True)
-def _lower_zmax(tile, kept, samples):
+def _lower_zmax(tile: Tile, kept: int, samples: int) -> None:
     """Take the farthest sample of each written pixel anew."""
     for lane in range(kept):
         p = tile.pixel[lane]
@@ -104,7 +121,9 @@ def _lower_zmax(tile, kept, samples):
 
 
 @njit(cache=True, nogil=True)
-def _shade_survivors(setup, colors, draw, tile, kept, shaded, column, line):
+def _shade_survivors(
+    setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, shaded: Any, column: int, line: int
+) -> None:
     for lane in range(kept):
         p = tile.pixel[lane]
         x, y = column + 7 - (p & 7), line + (p >> 3)
@@ -113,7 +132,7 @@ def _shade_survivors(setup, colors, draw, tile, kept, shaded, column, line):
 
 
 @njit(cache=True, nogil=True)
-def _count_sample(draw, tile, kept, sample, longest, row):
+def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, row: Any) -> None:
     """Count the surface reads and writes of one sample: a row of the tile is one 32-byte segment."""
     read = written = 0
     for lane in range(kept):
@@ -131,13 +150,15 @@ def _count_sample(draw, tile, kept, sample, longest, row):
 
 
 @njit(cache=True, nogil=True)
-def draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row):
+def draw_tile_multi(
+    setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
+) -> None:
     """Draw the list of one tile into ``tile``; ``row`` holds its counters or is None."""
     state, shaded, samples = tile.state, tile.addresses, 1 << draw.log_samples
     column, line = (left + draw.half_width) >> 4, (bottom + draw.half_height) >> 4
     tile.zmax[:] = DEPTH_MAX
     while True:
-        if state[FRAGMENTS] < 32 and state[3] < state[4]:
+        if state[FRAGMENTS] < 32 and state[NEXT] < state[END]:
             if draw.depth:
                 update_zmax(tile.zmax, state, row)
             refill(setup, entries, draw, tile, left, bottom, row)

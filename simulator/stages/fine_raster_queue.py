@@ -1,7 +1,7 @@
-"""Fine raster, the tile in hand: its pixels in shared memory and its queue of fragments (section 6 of the 2011 paper)."""
+"""Fine raster, the tile in hand: pixels in shared memory and a queue of fragments (Laine & Karras 2011, section 6)."""
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -10,6 +10,7 @@ from models.coalescing import transactions
 from simulator.stages.coverage import pixel_mask, square_mask
 from simulator.stages.exact import lowest_bit, popcount
 from simulator.stages.subtriangle import DEPTH_MAX
+from simulator.stages.triangle_setup_paths import Setup
 
 TILE = 8  # pixels
 PIXELS = TILE * TILE
@@ -94,7 +95,7 @@ HEAD, TAIL, FRAGMENTS, NEXT, END, ZMAX, UPDATE = range(7)  # columns of Tile.sta
 
 
 @njit(cache=True, nogil=True)
-def new_tile(samples):
+def new_tile(samples: int) -> Any:
     """Scratch for one warp."""
     many, i64 = samples * PIXELS, np.int64
     return Tile(
@@ -105,7 +106,7 @@ def new_tile(samples):
 
 
 @njit(cache=True, nogil=True)
-def corner(tile_index, draw):
+def corner(tile_index: int, draw: Draw) -> Any:
     """Lower left corner of a tile in the units of headers."""
     left = (tile_index % draw.tiles_x) * (16 * TILE) - draw.half_width
     bottom = (tile_index // draw.tiles_x) * (16 * TILE) - draw.half_height
@@ -113,7 +114,7 @@ def corner(tile_index, draw):
 
 
 @njit(cache=True, nogil=True)
-def update_zmax(depths, state, row):
+def update_zmax(depths: Any, state: Any, row: Any) -> None:
     """Take the tile's largest depth anew, if a fragment has covered a pixel that had it."""
     if state[UPDATE]:
         state[ZMAX] = depths[:PIXELS].max()
@@ -123,7 +124,7 @@ def update_zmax(depths, state, row):
 
 
 @njit(cache=True, nogil=True)
-def count_gather(tile, n, size, draw, row):
+def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     """Count a load of ``size`` bytes by each of n lanes at ``tile.addresses``."""
     count, read = transactions(tile.addresses, n, size, draw.coalescing)
     row[27] += count
@@ -131,7 +132,7 @@ def count_gather(tile, n, size, draw, row):
 
 
 @njit(cache=True, nogil=True)
-def read_segment(setup, entries, draw, tile, left, bottom, row):
+def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read up to 32 entries, cull them by depth, and queue those with a non-empty mask."""
     state = tile.state
     first, last = state[NEXT], min(state[NEXT] + SEGMENT, state[END])
@@ -172,7 +173,7 @@ def read_segment(setup, entries, draw, tile, left, bottom, row):
 
 
 @njit(cache=True, nogil=True)
-def refill(setup, entries, draw, tile, left, bottom, row):
+def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read on until 32 fragments are queued or the list ends."""
     state = tile.state
     queued = state[TAIL] - state[HEAD]
@@ -185,7 +186,7 @@ def refill(setup, entries, draw, tile, left, bottom, row):
 
 
 @njit(cache=True, nogil=True)
-def take(tile):
+def take(tile: Tile) -> Any:
     """Move up to 32 fragments in order from the queue to the lanes; returns how many."""
     state = tile.state
     n = 0
@@ -205,7 +206,7 @@ def take(tile):
 
 
 @njit(cache=True, nogil=True)
-def start_tile(tile, begin, end):
+def start_tile(tile: Tile, begin: int, end: int) -> None:
     """Empty the queue for a tile whose list is entries begin..end-1."""
     tile.state[:] = 0
     tile.state[NEXT] = begin

@@ -1,26 +1,29 @@
 """Fine raster, colour: barycentrics from integer planes, vertex colours, and blending (cudaraster 1.1)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from simulator.stages.coverage import SAMPLE_COLUMN
 from simulator.stages.exact import wrap_int32
+from simulator.stages.fine_raster_queue import Draw
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _plane(record, at, x, y):
+def _plane(record: Any, at: Any, x: Any, y: Any) -> Any:
     value = np.int64(record[at]) * x + np.int64(record[at + 1]) * y + np.int64(record[at + 2])
     return np.float32(wrap_int32(value))
 
 
 @njit(cache=True, nogil=True)
-def _channel(value):
+def _channel(value: Any) -> Any:
     """Eight bits of a channel in 0..1, rounded to nearest, saturating."""
     return np.int64(min(max(np.floor(np.float64(value) * 255.0 + 0.5), 0.0), 255.0)) if value == value else 0  # noqa: PLR0124
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shade(record, colors, x, y, sample, draw):
+def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
     """Interpolated vertex colour of one fragment, as 8-bit RGBA.
 
     Parameters
@@ -52,7 +55,7 @@ def shade(record, colors, x, y, sample, draw):
 
 
 @njit(cache=True, nogil=True)
-def blend_over(source, target):
+def blend_over(source: Any, target: int) -> Any:
     """Source over target, channel by channel, alpha too."""
     alpha = (source >> 24) & 255
     result = np.int64(0)

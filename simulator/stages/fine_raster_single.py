@@ -1,26 +1,33 @@
 """Fine raster at one sample a pixel: rounds of 32 fragments, depth test, ROP in input order (cudaraster, section 6)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from simulator.stages.fine_raster_queue import (
+    END,
     FRAGMENTS,
+    NEXT,
     PIXELS,
     UPDATE,
     ZMAX,
+    Draw,
+    Tile,
     count_gather,
     refill,
     take,
     update_zmax,
 )
 from simulator.stages.fine_raster_shade import blend_over, shade
+from simulator.stages.triangle_setup_paths import Setup
 
 _LOW = 0xFFFFFFFF
 _DATA_BYTES = 4  # a word of the data record
 
 
 @njit(cache=True, nogil=True)
-def _write(setup, colors, draw, tile, lane, x, y):
+def _write(setup: Setup, colors: Any, draw: Draw, tile: Tile, lane: int, x: int, y: int) -> None:
     """Put one fragment's colour and triangle into the tile."""
     p, slot = tile.pixel[lane], tile.slot[lane]
     tile.ids[p] = setup.inputs[slot]
@@ -31,7 +38,7 @@ def _write(setup, colors, draw, tile, lane, x, y):
 
 
 @njit(cache=True, nogil=True)
-def _depth_test(setup, draw, tile, n, column, line):
+def _depth_test(setup: Setup, draw: Draw, tile: Tile, n: int, column: int, line: int) -> Any:
     """Test n fragments against the depths before the round; survivors move to the front, depths to ``tile.mask``."""
     kept = 0
     state = tile.state
@@ -51,7 +58,7 @@ def _depth_test(setup, draw, tile, n, column, line):
 
 
 @njit(cache=True, nogil=True)
-def _rop(setup, colors, draw, tile, kept, column, line):
+def _rop(setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, column: int, line: int) -> Any:
     """Write survivors in order; returns the writes, and the most that one pixel had."""
     writes = longest = 0
     for lane in range(kept):
@@ -73,7 +80,7 @@ def _rop(setup, colors, draw, tile, kept, column, line):
 
 
 @njit(cache=True, nogil=True)
-def _conflicts(tile, kept):
+def _conflicts(tile: Tile, kept: int) -> Any:
     """Most survivors at one pixel, less one: the passes that a shared atomic takes again."""
     most = 0
     for lane in range(kept):
@@ -85,7 +92,7 @@ def _conflicts(tile, kept):
 
 
 @njit(cache=True, nogil=True)
-def count_reads(setup, draw, tile, n, words, row):
+def count_reads(setup: Setup, draw: Draw, tile: Tile, n: int, words: int, row: Any) -> None:
     """Count 16-byte reads of data records by n lanes, one for each of the ``words`` (bit k: bytes 16 * k on)."""
     for part in range(4):
         if (words >> part) & 1:
@@ -95,7 +102,7 @@ def count_reads(setup, draw, tile, n, words, row):
 
 
 @njit(cache=True, nogil=True)
-def _count_round(setup, draw, tile, n, kept, writes, longest, row):
+def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes: int, longest: Any, row: Any) -> None:
     row[7] += 1
     row[8] += n
     row[9] += n - kept
@@ -116,13 +123,15 @@ def _count_round(setup, draw, tile, n, kept, writes, longest, row):
 
 
 @njit(cache=True, nogil=True)
-def draw_tile_single(setup, entries, colors, draw, tile, left, bottom, row):
+def draw_tile_single(
+    setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
+) -> None:
     """Draw the list of one tile into ``tile``; ``row`` holds its counters or is None."""
     state = tile.state
     column, line = (left + draw.half_width) >> 4, (bottom + draw.half_height) >> 4
     state[UPDATE] = 1 if tile.depth[:PIXELS].min() < state[ZMAX] else 0
     while True:
-        if state[FRAGMENTS] < 32 and state[3] < state[4]:
+        if state[FRAGMENTS] < 32 and state[NEXT] < state[END]:
             if draw.depth:
                 update_zmax(tile.depth, state, row)
             refill(setup, entries, draw, tile, left, bottom, row)

@@ -1,5 +1,7 @@
 """Barycentrics of pixel centres from clip positions, as nvdiffrast's shader finds them after its rasterizer."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -8,7 +10,7 @@ _CHUNK = 16  # rows
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pixel(p0, p1, p2, fx, fy):
+def _pixel(p0: Any, p1: Any, p2: Any, fx: Any, fy: Any) -> Any:
     """Barycentrics of vertices 0 and 1, and z/w, in float64, before clamping."""
     x0, y0 = p0[0] - fx * p0[3], p0[1] - fy * p0[3]
     x1, y1 = p1[0] - fx * p1[3], p1[1] - fy * p1[3]
@@ -23,13 +25,13 @@ def _pixel(p0, p1, p2, fx, fy):
 
 
 @njit(cache=True, nogil=True)
-def _clamp(value, low, high):
+def _clamp(value: Any, low: Any, high: Any) -> Any:
     """Clamp, and take NaN for the lower end, as the GPU's saturation does."""
     return min(max(value, low), high) if value == value else low  # noqa: PLR0124
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows(first, last, ids, positions, triangles, out):
+def _rows(first: int, last: int, ids: Any, positions: Any, triangles: Any, out: Any) -> None:
     height, width = ids.shape
     corners = np.empty((3, 4), np.float64)
     for j in range(first, last):
@@ -48,7 +50,7 @@ def _rows(first, last, ids, positions, triangles, out):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _all_rows(ids, positions, triangles, out):
+def _all_rows(ids: Any, positions: Any, triangles: Any, out: Any) -> None:
     for c in prange((ids.shape[0] + _CHUNK - 1) // _CHUNK):
         _rows(c * _CHUNK, min((c + 1) * _CHUNK, ids.shape[0]), ids, positions, triangles, out)
 

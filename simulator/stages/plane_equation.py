@@ -1,5 +1,7 @@
 """Plane equations in integers: value = x * X + y * Y + base, modulo 2**32 (cudaraster 1.1, triangle setup)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -9,14 +11,27 @@ _LOW = 0xFFFFFFFF
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def reciprocal_area(area):
+def reciprocal_area(area: int) -> Any:
     """1 / area as a 24-bit mantissa and a right shift."""
     bits = float_bits(np.float32(1) / np.float32(area))
     return (bits & 0x7FFFFF) | 0x800000, 150 - (bits >> 23)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def plane_equation(u0, u1, u2, origin_x, origin_y, e1x, e1y, e2x, e2y, mantissa, shift, s):
+def plane_equation(
+    u0: Any,
+    u1: Any,
+    u2: Any,
+    origin_x: int,
+    origin_y: int,
+    e1x: int,
+    e1y: int,
+    e2x: int,
+    e2y: int,
+    mantissa: int,
+    shift: int,
+    s: int,
+) -> Any:
     """Plane through three vertex values.
 
     Parameters

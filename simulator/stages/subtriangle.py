@@ -1,7 +1,7 @@
 """One sub-triangle: snapping, culls, and the header and data record that later stages read (cudaraster 1.1, setup)."""
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -56,7 +56,7 @@ class Corner(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def snap(x, y, z, w, u, v, view):
+def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     """Project a clip position to the screen and round it to 1/16 pixel."""
     inverse = np.float32(1) / w
     sx = round_to_int32((x * inverse) * view.scale_x)
@@ -65,20 +65,20 @@ def snap(x, y, z, w, u, v, view):
 
 
 @njit(cache=True, nogil=True)
-def snapped_area(a, b, c):
+def snapped_area(a: Corner, b: Corner, c: Corner) -> Any:
     """Twice the area in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it."""
     return wrap_int32((b.sx - a.sx) * (c.sy - a.sy) - (b.sy - a.sy) * (c.sx - a.sx))
 
 
 @njit(cache=True, nogil=True)
-def _holds_site(a, b, c, x, y, sign):
+def _holds_site(a: Corner, b: Corner, c: Corner, x: int, y: int, sign: int) -> Any:
     ax, ay, bx, by, cx, cy = a.sx - x, a.sy - y, b.sx - x, b.sy - y, c.sx - x, c.sy - y
     ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
 
 
 @njit(cache=True, nogil=True)
-def _between_samples(a, b, c, view, sign):
+def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> Any:
     """Whether the triangle surely holds no site of the sample grid."""
     q = SUBPIXELS >> view.log_samples
     bx, by = view.half_width - q // 2, view.half_height - q // 2
@@ -95,7 +95,7 @@ def _between_samples(a, b, c, view, sign):
 
 
 @njit(cache=True, nogil=True)
-def cull(a, b, c, view):
+def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
     """Outcome of the culls that follow snapping, and the signed area."""
     area = snapped_area(a, b, c)
     if area == 0 or (area < 0 and view.cull_backfaces):
@@ -106,7 +106,7 @@ def cull(a, b, c, view):
 
 
 @njit(cache=True, nogil=True)
-def _flips(a, b):
+def _flips(a: Corner, b: Corner) -> Any:
     """How the coverage table is turned for the edge a -> b (bits: flip y, flip x, swap, complement)."""
     dx, dy = b.sx - a.sx, b.sy - a.sy
     flips = 0
@@ -120,18 +120,18 @@ def _flips(a, b):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lesser(a, b):
+def _lesser(a: Any, b: Any) -> Any:
     """Minimum that ignores NaN, as CUDA's does."""
     return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _depth_at(a):
+def _depth_at(a: Corner) -> Any:
     return fma(a.z * _DEPTH_SCALE, a.inverse_w, _DEPTH_BASE)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def store_header(a, b, c, view, headers, misc, slot):
+def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
     headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)
     headers[slot, 2], headers[slot, 3] = np.int16(b.sx & 0xFFFF), np.int16(b.sy & 0xFFFF)
@@ -144,7 +144,9 @@ def store_header(a, b, c, view, headers, misc, slot):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def store_depth_plane(a, b, c, mantissa, shift, view, planes, slot):
+def store_depth_plane(
+    a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
+) -> None:
     """Write x, y, base of the depth plane, and how far depth can vary inside a pixel (with several samples)."""
     s = view.log_samples
     half = 1 << (3 - s)
@@ -159,7 +161,20 @@ def store_depth_plane(a, b, c, mantissa, shift, view, planes, slot):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _store_plane(u0, u1, u2, a, b, c, mantissa, shift, view, planes, slot, at):
+def _store_plane(
+    u0: Any,
+    u1: Any,
+    u2: Any,
+    a: Corner,
+    b: Corner,
+    c: Corner,
+    mantissa: int,
+    shift: int,
+    view: View,
+    planes: Any,
+    slot: int,
+    at: int,
+) -> None:
     x, y, base = plane_equation(
         u0, u1, u2, a.sx + view.half_width, a.sy + view.half_height,
         b.sx - a.sx, b.sy - a.sy, c.sx - a.sx, c.sy - a.sy, mantissa, shift, view.log_samples + 1,
@@ -168,7 +183,9 @@ def _store_plane(u0, u1, u2, a, b, c, mantissa, shift, view, planes, slot, at):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def store_attribute_planes(a, b, c, mantissa, shift, view, planes, slot):
+def store_attribute_planes(
+    a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
+) -> None:
     """Write the planes of 1/w, u/w and v/w."""
     scale = min(a.w, b.w, c.w) * BARYCENTRIC_SCALE
     w0, w1, w2 = scale * a.inverse_w, scale * b.inverse_w, scale * c.inverse_w

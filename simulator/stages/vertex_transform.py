@@ -1,5 +1,7 @@
 """Vertices before the pipeline: model space to clip space in float32, and a colour where the mesh has none."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ _CHUNK = 4096  # vertices
 
 
 @njit(cache=True, nogil=True)
-def _transform_range(first, last, positions, matrix, out):
+def _transform_range(first: int, last: int, positions: Any, matrix: Any, out: Any) -> None:
     for v in range(first, last):
         for c in range(4):
             value = matrix[c, 0] * positions[v, 0]
@@ -23,13 +25,13 @@ def _transform_range(first, last, positions, matrix, out):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _transform(positions, matrix, out):
+def _transform(positions: Any, matrix: Any, out: Any) -> None:
     for c in prange((positions.shape[0] + _CHUNK - 1) // _CHUNK):
         _transform_range(c * _CHUNK, min((c + 1) * _CHUNK, positions.shape[0]), positions, matrix, out)
 
 
 @njit(cache=True, nogil=True)
-def _add_normals(positions, triangles, normals):
+def _add_normals(positions: Any, triangles: Any, normals: Any) -> None:
     """Add each triangle's normal, as long as its area, to its vertices."""
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -81,6 +83,6 @@ def vertex_colors(mesh: Mesh, matrix: NDArray[np.floating]) -> NDArray[np.float3
 
 
 def view_direction(matrix: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Unit vector along which the camera looks, in model space."""
+    """Find the unit vector along which the camera looks, in model space."""
     row = matrix[3, :3] if np.any(matrix[3, :3]) else matrix[2, :3]
     return np.asarray(row / max(float(np.linalg.norm(row)), 1e-30), np.float32)

@@ -1,0 +1,30 @@
+"""Cudaraster on a sphere: all four stages with every counter, and the growth from 10 thousand to a million triangles."""
+
+import numpy as np
+import pytest
+
+from models.simt import Simt
+from simulator.pipelines.cudaraster import cudaraster
+from simulator.scenes.scene import Mesh, Scene
+
+
+def sphere(triangles):
+    """Make a sphere of about so many triangles, in clip space."""
+    n = int(np.sqrt(triangles / 2))
+    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, n + 1), np.linspace(0.001, np.pi - 0.001, n + 1))
+    points = [0.7 * np.cos(u) * np.sin(v), 0.95 * np.cos(v), 0.9 * np.sin(u) * np.sin(v), np.ones_like(u)]
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.stack([i, i + 1, i + n + 1, i + 1, i + n + 2, i + n + 1], -1).reshape(-1, 3)
+    positions = np.stack(points, -1).reshape(-1, 4).astype(np.float32)
+    colors = np.ones((len(positions), 4), np.float32)
+    return Scene("sphere", mesh=Mesh(positions, faces.astype(np.int32), colors=colors, clip_space=True))
+
+
+@pytest.mark.parametrize("counting", [True, False])
+@pytest.mark.parametrize("triangles", [10_000, 100_000, 1_000_000])
+def test_cudaraster_1600x1200(benchmark, triangles, counting):
+    scene = sphere(triangles)
+    frame = benchmark.pedantic(
+        cudaraster, (scene, np.eye(4), 1600, 1200, Simt()), {"counting": counting}, rounds=3, warmup_rounds=1
+    )
+    assert (frame.triangle_ids >= 0).sum() > 900_000
