@@ -1,4 +1,4 @@
-"""Cudaraster on a sphere: all four stages with every counter, and the growth from 10 thousand to a million triangles."""
+"""Cudaraster on a sphere: four stages with every counter, and the growth from ten thousand to a million triangles."""
 
 import numpy as np
 import pytest
