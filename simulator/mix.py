@@ -13,7 +13,8 @@ A mix file (``simulator/mixes/PIPELINE/ccN.toml``) has a table for each kernel, 
     chain_alu = 12               # dependent instructions on a unit's critical warp
     lanes = "BOX_LANES"          # the event that counts the lanes active meanwhile; absent: whole warps
 
-An event that bears the name of a machine event needs no table: it passes through.
+An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
+variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
 """
 
 import tomllib
@@ -105,9 +106,9 @@ class Mix:
         warp : int
             Lanes in a warp of the machine.
         """
-        if work.kernel not in self.kernels:
+        kernel = self.kernels.get(f"{work.kernel}: {work.variant}") or self.kernels.get(work.kernel)
+        if kernel is None:
             raise TilestampError(f"the mix {self.name} has no kernel {work.kernel}")
-        kernel = self.kernels[work.kernel]
         return Launch(
             stage=work.stage,
             kernel=work.kernel,

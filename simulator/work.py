@@ -1,4 +1,4 @@
-"""What a stage did: a work table, one row a unit of work, a column for each of its own events; or items of a fixed pipe."""
+"""What a stage did: a work table, a row a unit of work, a column for each of its own events; or items of a fixed pipe."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -35,6 +35,8 @@ class Work:
         Buffers touched.
     atomic_requests : ndarray, (chunks,), int64, or None
         Global atomic requests by 32-byte chunk of the target buffer.
+    variant : str
+        How the kernel was compiled, where that changes its code (``"tile 8 spp 4"``): a mix may price it by itself.
     """
 
     stage: str
@@ -47,6 +49,7 @@ class Work:
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
+    variant: str = ""
 
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""

@@ -216,7 +216,7 @@ def bucket_count(
     _place(slots, count, idx)
     if table is None:
         return count, idx, []
-    return count, idx, [_init_work(tiles, padding, simt), _address_work(boxes, tiles, table, requests.sum(axis=0))]
+    return count, idx, [_init_work(tiles, padding, simt), _address_work(boxes, tiles, table, requests.sum(axis=0), aggregate=aggregate)]
 
 
 def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
@@ -236,7 +236,12 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
 
 
 def _address_work(
-    boxes: NDArray[np.float32], tiles: Tiles, table: NDArray[np.int64], requests: NDArray[np.int64]
+    boxes: NDArray[np.float32],
+    tiles: Tiles,
+    table: NDArray[np.int64],
+    requests: NDArray[np.int64],
+    *,
+    aggregate: bool,
 ) -> Work:
     """Work of the address calculation."""
     total = table.sum(axis=0)
@@ -251,5 +256,13 @@ def _address_work(
         ),
     )
     return Work(
-        "bucket_count", "address_calculation", _E, table, len(table), BLOCK, streams=streams, atomic_requests=requests
+        "bucket_count",
+        "address_calculation",
+        _E,
+        table,
+        len(table),
+        BLOCK,
+        streams=streams,
+        atomic_requests=requests,
+        variant=tiles.variant + " aggregated" * aggregate,
     )

@@ -32,6 +32,7 @@ class BucketWriteEvent(IntEnum):
     STORE_BYTES = 9
     BOX_BYTES = 10  # of LOAD_BYTES: boxes
     IDX_BYTES = 11  # of LOAD_BYTES: IDX
+    LAST_WRITE_WARPS = 12  # of WRITE_WARPS: the last slot, which compilers branch around and do not predicate
 
 
 _E = BucketWriteEvent
@@ -56,6 +57,7 @@ def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row
         return
     row[_E.DIVERGENT_WARPS] += active < lanes
     row[_E.WRITE_WARPS] += 1
+    row[_E.LAST_WRITE_WARPS] += slot == idx.shape[1] - 1
     row[_E.WRITE_LANES] += active
     for lane in range(lanes):
         addresses[lane] = max(tile[lane] * WORD_BYTES, -1)
@@ -149,4 +151,4 @@ def bucket_write(
         Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
         Stream("LISTS", "store", int(total[_E.STORE_BYTES]), lists.nbytes),
     )
-    return lists, [Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams)]
+    return lists, [Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)]

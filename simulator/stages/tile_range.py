@@ -27,6 +27,11 @@ class Tiles(NamedTuple):
         """Tiles of the screen."""
         return self.columns * self.rows
 
+    @property
+    def variant(self) -> str:
+        """How a kernel with a thread a patch is compiled for them."""
+        return f"{self.slots}x{self.slots} slots"
+
 
 def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
     """Cut a screen into tiles.

@@ -214,4 +214,5 @@ def _work(shape: BlockShape, table: NDArray[np.int64], lists: NDArray[np.uint32]
         shape.tile**2,
         shared_bytes(shape),
         streams=tuple(streams),
+        variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )

@@ -67,6 +67,7 @@ class TileRasterEvent(IntEnum):
     LOAD_BYTES = 30
     STORE_TRANSACTIONS = 31
     STORE_BYTES = 32
+    LIST_WARPS = 33  # of PIXEL_WARPS: in a tile that has grids
 
 
 _E = TileRasterEvent
@@ -147,6 +148,7 @@ def count_block(block, lists, first, grids, shape, traffic, row):
     subtiles = shape.side * shape.side
     row[_E.PIXEL_WARPS] = row[_E.RESOLVE_WARPS] = shape.warps
     row[_E.PIXEL_LANES] = threads
+    row[_E.LIST_WARPS] = shape.warps if grids > 0 else 0
     row[_E.GRIDS] = grids
     row[_E.BATCHES] = (grids + batch - 1) // batch
     row[_E.BATCH_WARPS] = row[_E.BATCHES] * shape.warps
@@ -181,12 +183,13 @@ def count_block(block, lists, first, grids, shape, traffic, row):
 
 @njit(cache=True, nogil=True)
 def _count_loads(block, lists, first, grids, shape, traffic, row):
-    """START and COUNT by every warp; then an index for 16 lanes, a grid by 16 lanes, edge equations by the same."""
+    """COUNT by every warp, START if there are grids; then an index for 16 lanes, a grid and its edges by the same."""
     together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // VERTICES)  # grids an instruction
     requests = shape.warps * (max(1, shape.warp // VERTICES) if shape.coalescing == _HALF_WARP else 1)
     count, size = contiguous(block * WORD_BYTES, WORD_BYTES, shape.coalescing)
-    row[_E.LOAD_TRANSACTIONS] += 2 * requests * count
-    row[_E.LOAD_BYTES] += 2 * requests * size
+    words = 2 if grids > 0 else 1
+    row[_E.LOAD_TRANSACTIONS] += words * requests * count
+    row[_E.LOAD_BYTES] += words * requests * size
     batch = shape.tile * shape.tile // VERTICES
     for base in range(0, grids, batch):
         loaded = min(batch, grids - base)
