@@ -60,7 +60,7 @@ def work(frame, kernel):
 @pytest.mark.parametrize("culling", [True, False])
 @pytest.mark.parametrize(("pipeline", "options"), [(tiled, {}), (per_primitive, {"race": False})])
 def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipeline, options, culling):
-    frame = draw(scene, matrix, pipeline, culling=culling, **options)
+    frame = draw(scene, matrix, pipeline, cull_backfaces=culling, **options)
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
     ids, depth, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT, culling=culling)
     sure = doubt > NEAR_EDGE
@@ -93,7 +93,7 @@ def test_the_picture_does_not_depend_on_the_tile(scene, matrix, tile):
 
 
 def test_tiles_and_primitives_agree_without_the_race(scene, matrix):
-    tiles, primitives = draw(scene, matrix, culling=False), draw(scene, matrix, per_primitive, race=False)
+    tiles, primitives = draw(scene, matrix, cull_backfaces=False), draw(scene, matrix, per_primitive, race=False)
     assert (tiles.triangle_ids != primitives.triangle_ids).mean() < 0.002  # equal integer depths
 
 
@@ -124,8 +124,8 @@ def test_every_thread_tests_every_entry(scene, matrix):
 def test_the_originals_room_overflows_and_says_so():
     scene = soup(seed=1, count=110)
     matrix = LookAt((0, 0, 40), (0, 0, 0), fov_degrees=45).matrix(WIDTH, HEIGHT)
-    assert draw(scene, matrix, capacity="original", culling=False).facts["list entries lost by overflow"] > 0
-    assert draw(scene, matrix, capacity="safe", culling=False).facts["list entries lost by overflow"] == 0
+    assert draw(scene, matrix, capacity="original", cull_backfaces=False).facts["list entries lost by overflow"] > 0
+    assert draw(scene, matrix, capacity="safe", cull_backfaces=False).facts["list entries lost by overflow"] == 0
 
 
 def test_one_triangle_cannot_race(matrix):
@@ -157,7 +157,7 @@ def test_a_triangle_behind_the_eye_is_dropped_and_counted(matrix):
 def test_a_degenerate_triangle_draws_nothing(matrix):
     scene = soup(count=1)
     points = np.repeat(scene.mesh.positions[:1], 3, axis=0)
-    frame = draw(Scene("point", mesh=replace(scene.mesh, positions=points)), matrix, culling=False)
+    frame = draw(Scene("point", mesh=replace(scene.mesh, positions=points)), matrix, cull_backfaces=False)
     assert (frame.triangle_ids == -1).all()
 
 

@@ -46,7 +46,10 @@ def test_a_node_places_its_mesh(tmp_path):
 
 def test_a_child_is_placed_by_its_parents(tmp_path):
     def change(tree):
-        tree["nodes"] = [{"children": [1], "translation": [1, 0, 0]}, {"mesh": 0, "rotation": [0, 0, 0.5**0.5, 0.5**0.5]}]
+        tree["nodes"] = [
+            {"children": [1], "translation": [1, 0, 0]},
+            {"mesh": 0, "rotation": [0, 0, 0.5**0.5, 0.5**0.5]},
+        ]
 
     assert read_gltf(glb(tmp_path, change)).positions[1, :3] == pytest.approx([1, 1, 0])
 
@@ -138,7 +141,7 @@ def test_a_missing_texture_shows_the_colour(tmp_path):
 def test_a_broken_line_is_named(tmp_path):
     path = tmp_path / "m.obj"
     path.write_text("v 0 0 0\nf 1 2 3\n")
-    with pytest.raises(TilestampError, match="m.obj:2"):
+    with pytest.raises(TilestampError, match=r"m\.obj:2"):
         read_textured_obj(path)
 
 
@@ -151,7 +154,9 @@ def test_a_triangle_with_a_nan_vertex_is_not_drawn():
 
 def test_nan_coordinates_show_the_base_colour():
     uvs = np.full((3, 2), np.nan, np.float32)
-    mesh = Mesh(np.ones((3, 4), np.float32), np.array([[0, 1, 2]], np.int32), uvs=uvs, texture_ids=np.zeros(1, np.int32))
+    mesh = Mesh(
+        np.ones((3, 4), np.float32), np.array([[0, 1, 2]], np.int32), uvs=uvs, texture_ids=np.zeros(1, np.int32)
+    )
     assert geometry(Scene("s", mesh=mesh)).texture_ids.tolist() == [-1]
 
 

@@ -53,7 +53,7 @@ def opaque_colors(scene, seed=2):
 
 @pytest.mark.parametrize("culling", [True, False])
 def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, culling):
-    frame = draw(scene, matrix, culling=culling)
+    frame = draw(scene, matrix, cull_backfaces=culling)
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
     ids, depth, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT, culling=culling)
     sure = doubt > NEAR_EDGE
@@ -95,8 +95,8 @@ def test_transparency_is_sorting_the_fragments_of_each_pixel(scene, matrix):
 
 
 def test_fragments_beyond_the_kept_ones_are_counted(scene, matrix):
-    every = draw(scene, matrix, order="oit", fragments_a_pixel=0, culling=False)
-    few = draw(scene, matrix, order="oit", fragments_a_pixel=2, culling=False)
+    every = draw(scene, matrix, order="oit", fragments_a_pixel=0, cull_backfaces=False)
+    few = draw(scene, matrix, order="oit", fragments_a_pixel=2, cull_backfaces=False)
     assert every.facts["fragments lost beyond the kept ones"] == 0
     kept = work(few, "ROP").counts()
     assert kept["LOST"] + kept["BLEND_LANES"] == work(every, "ROP").counts()["BLEND_LANES"]
@@ -113,7 +113,7 @@ def test_clipping_changes_nothing_inside(matrix):
 
 def test_a_triangle_through_the_eye_plane_is_clipped(matrix):
     corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [0, 0.5, 9, 1]], np.float32)
-    frame = draw(Scene("ramp", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32))), matrix, culling=False)
+    frame = draw(Scene("ramp", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32))), matrix, cull_backfaces=False)
     assert (frame.triangle_ids == 0).any()
 
 

@@ -15,7 +15,7 @@ from simulator.run import Run
 from simulator.scenes.camera import Camera, LookAt, fit_camera
 from simulator.scenes.library import load_scene
 from simulator.scenes.scene import Mesh, Scene
-from simulator.simulate import simulate
+from simulator.simulate import Fidelity, simulate
 
 MACHINE = "gt750m"
 SIZE = 800  # pixels
@@ -41,7 +41,7 @@ def model(name: str) -> Scene:
 
 
 def _cube() -> Mesh:
-    """A unit cube around the origin, 12 triangles, seen from a corner so that three sides show."""
+    """Make a unit cube around the origin, 12 triangles, seen from a corner so that three sides show."""
     corners = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
     turn = np.array([[0.707, 0.0, 0.707], [0.408, 0.816, -0.408], [-0.577, 0.577, 0.577]])
     quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
@@ -59,7 +59,7 @@ def camera(scene: Scene) -> Camera:
     return CAMERA
 
 
-def draw(name: str, pipeline: str, fidelity: str = "schedule", **options: object) -> Run | None:
+def draw(name: str, pipeline: str, fidelity: Fidelity = "schedule", **options: object) -> Run | None:
     """Draw one model as he did; None where it is not on the scene path."""
     try:
         scene = model(name)

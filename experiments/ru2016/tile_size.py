@@ -21,17 +21,17 @@ def run(progress: Callable[[str], None]) -> Result:
     table = published("tile_size")
     machine = load_machine(MACHINE)
     cells, times = [], {}
-    for row in table.itertuples():
-        tile = int(row.tile_size)
+    for row in table.to_dict("records"):
+        tile = int(row["tile_size"])
         progress(f"tile {tile}")
         held = residency(machine, tile * tile, REGISTERS, 0)
         label = f"{tile}x{tile}"
-        cells.append(Cell(label, "occupancy", "%", float(row.occupancy_percent), 100.0 * held.occupancy, aim=0.0))
-        cells.append(Cell(label, "resident blocks", "blocks", float(row.resident_blocks), held.blocks, aim=0.0))
+        cells.append(Cell(label, "occupancy", "%", float(row["occupancy_percent"]), 100.0 * held.occupancy, aim=0.0))
+        cells.append(Cell(label, "resident blocks", "blocks", float(row["resident_blocks"]), held.blocks, aim=0.0))
         frame = draw(MODEL, "tiled", tile=tile, capacity="original")
         if frame is not None:
             times[tile] = frame
-    notes = ["His view of the engine is not known: it fills the window here. His two tables disagree on it: 27.2 and 38 ms at tile 8."]
+    notes = ["The engine fills the window here: his view is not known. His two tables disagree on it: 27.2 and 38 ms."]
     rows: list[Cell] = []
     if times:
         asked = dict(zip(table.tile_size, table.ms, strict=True))
@@ -71,7 +71,7 @@ def run(progress: Callable[[str], None]) -> Result:
 
 
 def _raster(frame: object) -> dict[str, float]:
-    """What the raster kernel did."""
+    """Say what the raster kernel did."""
     stages = frame.stages  # type: ignore[attr-defined]
     row = stages.loc["tiled_raster"]
     return {"raster_ms": row.milliseconds, "bound": row.bound, "sample_tests": row.sample_tests, "ste": row.ste}

@@ -65,9 +65,9 @@ def run(progress: Callable[[str], None]) -> Result:
     frame = nodes({str(stage): 1e3 * float(ms) for stage, ms in stages.items()}, machine)
     stream = on_stream(frame, machine.launch.stream_us, machine.launch.sync_us)
     graph = as_graph(frame, machine.launch.graph_us, machine.launch.sync_us)
-    asked = published("graph").set_index("metric")
-    wait = 1e3 * float(asked.loc["gpu_time_rasterize_pipeline", "default_stream_ms"]) - stream.gpu_us
-    mapping = 1e3 * float(asked.loc["gpu_time", "cuda_graph_ms"]) - graph.gpu_us
+    asked = {str(row["metric"]): row for row in published("graph").to_dict("records")}
+    wait = 1e3 * float(asked["gpu_time_rasterize_pipeline"]["default_stream_ms"]) - stream.gpu_us
+    mapping = 1e3 * float(asked["gpu_time"]["cuda_graph_ms"]) - graph.gpu_us
     pairs = {
         "gpu_time_rasterize_pipeline": (stream.gpu_us + wait, graph.gpu_us),
         "gpu_time": (stream.gpu_us + wait, graph.gpu_us + mapping),
@@ -75,7 +75,7 @@ def run(progress: Callable[[str], None]) -> Result:
         "total_frame_time": (stream.cpu_us + wait + mapping, graph.cpu_us + mapping),
     }
     cells = [
-        Cell(metric, column, "ms", float(asked.loc[metric, f"{column}_ms"]), us / 1e3, _status(metric, column), aim=0.5)
+        Cell(metric, column, "ms", float(asked[metric][f"{column}_ms"]), us / 1e3, _status(metric, column), aim=0.5)
         for metric, both in pairs.items()
         for column, us in zip(("default_stream", "cuda_graph"), both, strict=True)
     ]
@@ -88,9 +88,13 @@ def run(progress: Callable[[str], None]) -> Result:
     cleared = sum(n.gpu_us for n in frame if n.name in CLEARS)
     notes = [
         f"Critical path of the graph: {' > '.join(graph.path)}.",
-        f"Clears take {cleared / 1e3:.2f} ms of the stream; side by side they still share one memory, which this graph "
-        "does not model, so its clears are too cheap where several overlap.",
-        f"Fitted: {wait / CALLS:.0f} us that each of {CALLS} calls on the stream keeps the GPU idle beyond the machine's "
-        f"launch time, and {mapping:.0f} us to map and unmap the window's buffer, which he says leaves the GPU idle.",
+        (
+            f"Clears take {cleared / 1e3:.2f} ms of the stream; side by side they still share one memory, which this "
+            "graph does not model, so its clears are too cheap where several overlap."
+        ),
+        (
+            f"Fitted: {wait / CALLS:.0f} us that each of {CALLS} calls on the stream keeps the GPU idle beyond the "
+            f"machine's launch time, and {mapping:.0f} us to map and unmap the window's buffer."
+        ),
     ]
     return Result("zhang2025/graph", "Stream against graph", SOURCE, cells, [], notes, tables={"graph": table})

@@ -23,8 +23,10 @@ def run(progress: Callable[[str], None]) -> Result:
     scene = bunny()
     limits = [f"{name} {most_triangles(load_machine(name)):,}" for name in CANDIDATES]
     notes = [
-        "No cell is fitted: instructions are counted by hand from his loops, registers are published, and the caches' and "
-        "launch constants of both machines are assumed.",
+        (
+            "No cell is fitted: instructions are counted by hand from his loops, registers are published, and the "
+            "caches' and launch constants of both machines are assumed."
+        ),
         f"Triangles that the cooperative compaction can take by the machine file: {', '.join(limits)} (he says 10 k).",
     ]
     if scene is None:

@@ -1,4 +1,4 @@
-"""Features off and on, side by side: perspective correction, filtering, ambient occlusion, transparency, the write race."""
+"""Features off and on, side by side: perspective, filtering, ambient occlusion, transparency, the write race."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ PAIRS: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "bilinear filtering": ("tiled", "ga104", {"texture_filter": "nearest"}, {"texture_filter": "bilinear"}),
     "trilinear filtering": ("binned", "ga104", {"texture_filter": "bilinear"}, {"texture_filter": "trilinear"}),
     "ambient occlusion": ("tiled", "ga104", {"ssao": False}, {"ssao": True}),
-    "transparency": ("binned", "ga104", {}, {"order": "oit", "opacity": 0.5, "culling": False}),
+    "transparency": ("binned", "ga104", {}, {"order": "oit", "opacity": 0.5, "cull_backfaces": False}),
     "protected writes": ("per-primitive", "ga104", {"race": True}, {"race": False}),
 }
 
@@ -60,7 +60,7 @@ def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:
 
 
 def _side_by_side(name: str, off: NDArray[np.uint8], on: NDArray[np.uint8]) -> Callable[[Path], None]:
-    """A figure with both pictures."""
+    """Make a figure with both pictures."""
 
     def draw(path: Path) -> None:
         with figure(path, f"{name}: off, on", figsize=(9.6, 5.0)) as axes:

@@ -29,7 +29,7 @@ def published(name: str) -> pd.DataFrame:
 
 
 def bunny() -> Scene | None:
-    """The bunny with a texture; None where it is not on the scene path."""
+    """Give the bunny a texture; None where it is not on the scene path."""
     try:
         scene = load_scene("bunny_5k", kind="mesh")
     except TilestampError:

@@ -21,7 +21,7 @@ FILTERS = ("bilinear", "trilinear")
 
 
 def wall(minification: float, degrees: int) -> Scene:
-    """A square over the whole screen, in clip space, with a texture at so many texels a pixel, turned by an angle."""
+    """Make a square over the whole screen, its texture at so many texels a pixel, turned by an angle."""
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     turn = np.radians(degrees)
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -72,8 +72,12 @@ def run(progress: Callable[[str], None]) -> Result:
         ),
     )  # fmt: skip
     notes = [
-        "A storage tile is 4x4 texels of 4 bytes (assumed; the source gives no size). Counted before any cache: "
-        "distinct 32-byte sectors of each warp load."
+        (
+            "A storage tile is 4x4 texels of 4 bytes (assumed; the source gives no size). Counted before any cache: "
+            "distinct 32-byte sectors of each warp load."
+        )
     ]
     source = "Zhang 2025 names an optimized tile linear storage, without figures"
-    return Result("zhang2025/texture_traffic", "Texture traffic by layout", source, cells, [figure], notes, [], {"traffic": table})
+    return Result(
+        "zhang2025/texture_traffic", "Texture traffic by layout", source, cells, [figure], notes, [], {"traffic": table}
+    )

@@ -1,4 +1,4 @@
-"""Zhang 2025: sort-middle with bins, tiles and quads, trilinear textures, API order or order-independent transparency."""
+"""Zhang 2025: sort-middle by bins, tiles and quads; trilinear textures; API order or order-independent transparency."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ def binned(
     order: Order = "api",
     texture_filter: Filter = "trilinear",
     texture_layout: str = "tiled",
-    culling: bool = True,
+    cull_backfaces: bool = True,
     fragments_a_pixel: int = KEPT,
     opacity: float = 1.0,
     optimized: bool = True,
@@ -49,7 +49,7 @@ def binned(
         Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
     texture_filter : {"nearest", "bilinear", "trilinear"}
     texture_layout : {"tiled", "rows"}
-    culling : bool
+    cull_backfaces : bool
         Cull triangles that face away.
     fragments_a_pixel : int
         How many a pixel can keep (the original: 4); 0 for all.
@@ -71,7 +71,7 @@ def binned(
     opaque = order == "api"
 
     vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
-    slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=culling)
+    slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=cull_backfaces)
     primitives, compaction = primitive_compaction(slots, len(mesh.triangles), simt)
     data, setup = triangle_setup(primitives, simt)
     bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))

@@ -25,7 +25,7 @@ def per_primitive(
     height: int,
     simt: Simt,
     *,
-    culling: bool = False,
+    cull_backfaces: bool = False,
     race: bool = True,
     perspective: bool = True,
     texture_filter: Filter = "bilinear",
@@ -37,7 +37,7 @@ def per_primitive(
     ----------
     scene, matrix, width, height, simt
         See ``simulator.pipelines``.
-    culling : bool
+    cull_backfaces : bool
         Leave out triangles that face away; the original's basic path does not.
     race : bool
         Show what the unprotected writes leave (by the model of ``per_primitive_raster``); False: what was meant.
@@ -53,7 +53,7 @@ def per_primitive(
     vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
     drawable, assembly = primitive_assembly(mesh, vertices, simt)
     meant, raced, raster = per_primitive_raster(
-        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=culling
+        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces
     )
     works += [shading, assembly, raster]
     wrong = raced.triangles != meant.triangles

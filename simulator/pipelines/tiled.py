@@ -29,7 +29,7 @@ def tiled(
     simt: Simt,
     *,
     tile: int = 8,
-    culling: bool = True,
+    cull_backfaces: bool = True,
     capacity: Capacity = "safe",
     perspective: bool = True,
     texture_filter: Filter = "bilinear",
@@ -43,7 +43,7 @@ def tiled(
         See ``simulator.pipelines``.
     tile : int
         Pixels on a side of a tile, 4 to 32.
-    culling : bool
+    cull_backfaces : bool
         Leave out triangles that face away.
     capacity : {"safe", "original"}
         Count, scan and fill the lists; or the original's room of a tenth of all triangles, which can overflow.
@@ -63,7 +63,15 @@ def tiled(
     vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
     drawable, assembly = primitive_assembly(mesh, vertices, simt)
     lists, listing, lost = tile_lists(
-        vertices.screen, mesh.triangles, drawable, width, height, simt, tile=tile, culling=culling, capacity=capacity
+        vertices.screen,
+        mesh.triangles,
+        drawable,
+        width,
+        height,
+        simt,
+        tile=tile,
+        culling=cull_backfaces,
+        capacity=capacity,
     )
     visible, raster = tiled_raster(vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile)
     works += [shading, assembly, *listing, raster]

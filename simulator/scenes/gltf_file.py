@@ -1,11 +1,9 @@
-"""Reader of glTF 2.0 (.glb, .gltf): nodes and instances, several materials, base-colour textures; broken files in a sentence.
+"""Reader of glTF 2.0 (.glb, .gltf): nodes and instances, materials, base-colour textures; broken files in a sentence.
 
 Read are triangle lists with indices or without, positions, normals, the first texture coordinates, base-colour
 factors and textures, matrices and translation-rotation-scale of nodes, any number of instances. Animations, skins,
 cameras and lights are passed over. Draco, meshopt and sparse accessors are refused by name.
 """
-
-from __future__ import annotations
 
 import base64
 import binascii
@@ -73,7 +71,10 @@ class GltfFile:
         except (KeyError, TypeError, ValueError) as error:
             raise TilestampError(f"{self.path.name}: broken glTF: accessor {index}: {error}") from None
         if accessor.get("normalized"):
-            return np.maximum(values.astype(np.float32) / np.float32(np.iinfo(kind).max), np.float32(-1.0))
+            floats: NDArray[Any] = np.maximum(
+                values.astype(np.float32) / np.float32(np.iinfo(kind).max), np.float32(-1.0)
+            )
+            return floats
         return values
 
     def image(self, index: int) -> NDArray[np.uint8]:
@@ -164,7 +165,7 @@ def _split(path: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def _local(node: dict[str, Any]) -> NDArray[np.float64]:
-    """A node's own matrix, row-major for column vectors."""
+    """Give a node's own matrix, row-major for column vectors."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""Textures as kernels read them: mip chains of all textures in one array, row-major or in small tiles, and their filters.
+"""Textures as kernels read them: mip chains of all textures in one array, row-major or in small tiles; filters.
 
 Zhang keeps texels in "tile linear storage" so that a quad's texels share a cache line; his README gives no tile size,
 so 4x4 texels of 4 bytes (64 bytes, two sectors) are an assumption. Coordinates wrap (glTF's default, REPEAT).
@@ -81,7 +81,7 @@ def _chain(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
 
 
 def _stored(level: NDArray[np.float32], tiled: bool) -> NDArray[np.float32]:
-    """A level's texels in memory order, (n, 4)."""
+    """Lay out a level's texels in memory order, (n, 4)."""
     if not tiled:
         return level.reshape(-1, 4)
     rows, columns = (-(-size // TILE) for size in level.shape[:2])
@@ -91,7 +91,7 @@ def _stored(level: NDArray[np.float32], tiled: bool) -> NDArray[np.float32]:
 
 
 @njit(cache=True, nogil=True)
-def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> int:
+def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
     """Where texel (x, y) of a level lies, in texels; x and y wrap."""
     first = chains.levels[texture, level, 0]
     width = chains.levels[texture, level, 1]

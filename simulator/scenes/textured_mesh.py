@@ -51,7 +51,7 @@ def geometry(scene: Scene) -> Geometry:
     if mesh is None or len(mesh.triangles) == 0:
         raise TilestampError(f"the scene {scene.name} has no triangles, which the textured pipelines draw")
     count = len(mesh.positions)
-    finite = np.isfinite(mesh.positions).all(axis=1)
+    finite = np.asarray(np.isfinite(mesh.positions).all(axis=1))
     ids = np.flatnonzero(finite[mesh.triangles].all(axis=1)).astype(np.int32)
     triangles = mesh.triangles[ids]
     positions = np.where(finite[:, None], mesh.positions, np.float32(0.0))
@@ -60,14 +60,19 @@ def geometry(scene: Scene) -> Geometry:
     uvs = np.zeros((count, 2), np.float32) if mesh.uvs is None else mesh.uvs
     textures = np.full(len(ids), -1, np.int32)
     if mesh.texture_ids is not None and mesh.uvs is not None:
-        mapped = np.isfinite(uvs).all(axis=1)[triangles].all(axis=1)
+        known = np.asarray(np.isfinite(uvs).all(axis=1))
+        mapped = known[triangles].all(axis=1)
         textures = np.where(mapped, mesh.texture_ids[ids], np.int32(-1)).astype(np.int32)
-    clean = (np.nan_to_num(a, posinf=0.0, neginf=0.0).astype(np.float32) for a in (colors, normals, uvs))
-    return Geometry(positions, triangles, *clean, textures, ids)
+    return Geometry(positions, triangles, _clean(colors), _clean(normals), _clean(uvs), textures, ids)
+
+
+def _clean(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Put 0 for what is not finite."""
+    return np.nan_to_num(values, posinf=0.0, neginf=0.0).astype(np.float32)
 
 
 def vertex_normals(positions: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Normals at the vertices, weighted by the areas around, (V, 3)."""
+    """Make normals at the vertices, weighted by the areas around, (V, 3)."""
     a, b, c = (positions[triangles[:, k], :3].astype(np.float64) for k in range(3))
     normals = np.zeros((len(positions), 3))
     face = np.cross(b - a, c - a)
@@ -153,7 +158,7 @@ def _triangles(file: GltfFile, primitive: dict[str, Any], count: int) -> NDArray
 
 
 def _material(file: GltfFile, primitive: dict[str, Any], images: dict[int, int]) -> tuple[NDArray[np.float32], int]:
-    """Base colour of a primitive and the number of its texture, -1 for none."""
+    """Find the base colour of a primitive and the number of its texture, -1 for none."""
     materials = file.tree.get("materials", [])
     index = primitive.get("material", -1)
     if not -1 <= index < len(materials):
@@ -176,7 +181,7 @@ def _normals(
     positions: NDArray[np.float32],
     triangles: NDArray[np.int32],
 ) -> NDArray[np.float32]:
-    """Normals of a part in the scene's space."""
+    """Give the normals of a part in the scene's space."""
     if "NORMAL" not in attributes:
         return vertex_normals(positions, triangles)
     normals = file.accessor(attributes["NORMAL"]).astype(np.float64) @ np.linalg.pinv(matrix[:3, :3])
@@ -189,5 +194,5 @@ def _join(parts: list[dict[str, Any]], textures: tuple[NDArray[np.uint8], ...]) 
     starts = np.cumsum([0] + [len(part["positions"]) for part in parts[:-1]])
     for part, start in zip(parts, starts, strict=True):
         part["triangles"] = part["triangles"] + np.int32(start)
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    columns: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Mesh(**columns, textures=textures)

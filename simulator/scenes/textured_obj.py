@@ -103,7 +103,7 @@ def _mesh(
         triangles=triangles,
         colors=colors[unique[:, 3]],
         normals=np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, smooth),
-        uvs=coordinates * np.float32([1.0, -1.0]) + np.float32([0.0, 1.0]),  # OBJ's v runs up
+        uvs=coordinates * np.array([1.0, -1.0], np.float32) + np.array([0.0, 1.0], np.float32),  # OBJ's v runs up
         texture_ids=texture_of[unique[triangles[:, 0], 3]],
         textures=textures,
     )
@@ -112,7 +112,7 @@ def _mesh(
 def _smooth(
     points: NDArray[np.float32], position: NDArray[np.int64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float32]:
-    """Normals over shared positions, so that a texture seam does not show."""
+    """Make normals over shared positions, so that a texture seam does not show."""
     return vertex_normals(points, position[triangles].astype(np.int32))[position]
 
 

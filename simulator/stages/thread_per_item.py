@@ -1,4 +1,4 @@
-"""Kernels of one thread an item and the same work for each: vertex shading, copies, clears. Their work table by block."""
+"""Kernels of one thread an item, the same work for each: vertex shading, copies, clears. Their work table by block."""
 
 from enum import IntEnum
 from typing import NamedTuple

@@ -46,7 +46,7 @@ def noise() -> NDArray[np.float32]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int, y: int, radius: Any) -> int:
-    """Samples of one pixel that lie behind what is drawn there."""
+    """Count the samples of one pixel that lie behind what is drawn there."""
     height, width = w.shape
     distance = w[y, x] / scales[2]
     px = ((np.float32(x) + _HALF) / np.float32(width) * np.float32(2.0) - _ONE) * w[y, x] / scales[0]

@@ -130,7 +130,8 @@ def interpolate(mesh: Geometry, vertices: ShadedVertices, visible: Visible, *, p
         Perspective-correct, or linear on the screen.
     """
     shape = visible.triangles.shape
-    fragments = Fragments(*(np.zeros((*shape, n), np.float32) for n in (2, 3, 3)), np.zeros(shape, np.float32))
+    uvs, normals, colors = (np.zeros((*shape, n), np.float32) for n in (2, 3, 3))
+    fragments = Fragments(uvs, normals, colors, np.zeros(shape, np.float32))
     _interpolate(
         vertices.screen, mesh.triangles, mesh.uvs, vertices.normals, mesh.colors, visible.triangles,
         perspective, *fragments,
@@ -212,7 +213,7 @@ def fragment_shading(
 
 
 def _shading_work(drawn: NDArray[np.bool_], texture_filter: Filter, simt: Simt) -> Work:
-    """Count the shading kernel: a warp is 8x4 pixels; one without a fragment reads two words of each and stores black."""
+    """Count the shading kernel: a warp is 8x4 pixels; one without a fragment reads two words of each, stores black."""
     event = FragmentShadingEvent
     rows, columns = -(-drawn.shape[0] // SIDE), -(-drawn.shape[1] // SIDE)
     padded = np.zeros((rows * SIDE, columns * SIDE), np.int64)

@@ -78,7 +78,7 @@ class Race(NamedTuple):
 def _wave(
     screen: Any, triangles: Any, drawable: Any, first: int, end: int, culling: bool, warp: int, merge: int,
     nearest: Any, depth: Any, raced: Any, landed: Any, rounds: int, requests: Any, events: Any,
-) -> int:  # fmt: skip
+) -> Any:  # fmt: skip
     """Run the resident warps first..end-1 to their ends; returns the round after the last."""
     boxes = np.zeros((end - first, warp, 5), np.int64)  # left, columns, top, pixels, triangle
     longest = np.zeros(end - first, np.int64)
@@ -117,7 +117,7 @@ def _wave(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _row(events: Any, w: int, warp: int) -> Any:
-    """The events of a warp's block."""
+    """Give the events of a warp's block."""
     if events is None:
         return None
     return events[w * warp // BLOCK]
@@ -126,7 +126,7 @@ def _row(events: Any, w: int, warp: int) -> Any:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, first: int, shape: Any, culling: bool, boxes: Any, row: Any
-) -> int:
+) -> Any:
     """Cull, and find each lane's box of pixels; returns the most pixels of a lane."""
     longest = 0
     for lane in range(len(boxes)):

@@ -70,9 +70,9 @@ def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, to
     """Whether a triangle and a square tile overlap: no axis of five separates them (touching counts)."""
     right = left + size
     bottom = top + size
-    if max(x0, max(x1, x2)) < left or min(x0, min(x1, x2)) > right:
+    if max(x0, x1, x2) < left or min(x0, x1, x2) > right:
         return False
-    if max(y0, max(y1, y2)) < top or min(y0, min(y1, y2)) > bottom:
+    if max(y0, y1, y2) < top or min(y0, y1, y2) > bottom:
         return False
     return not (
         _separates(x0, y0, x1, y1, x2, y2, left, top, right, bottom)
@@ -84,7 +84,7 @@ def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, to
 @njit(cache=True, nogil=True, error_model="numpy")
 def _separates(
     ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, left: Any, top: Any, right: Any, bottom: Any
-) -> bool:
+) -> Any:
     """Whether the normal of edge ab separates the tile from the triangle, whose third corner is c."""
     nx = ay - by
     ny = bx - ax

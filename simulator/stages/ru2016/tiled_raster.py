@@ -173,7 +173,7 @@ def tiled_raster(
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
-    """All lanes read the same words: one transaction for each word; fragments are stored word by word, 60 bytes apart."""
+    """All lanes read the same words, a transaction each; fragments are stored word by word, 60 bytes apart."""
     segment = 128 if simt.coalescing == 2 else 32
     reads = events[:, TiledRasterEvent.TEST_WARPS] * (PRIMITIVE_BYTES // 4 + 1)  # the primitive, and its number
     lanes = np.where(np.arange(simt.warp) < tile * tile, np.arange(simt.warp), -1)

@@ -33,7 +33,7 @@ def barycentric(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def inside(a: Any, b: Any, c: Any) -> bool:
+def inside(a: Any, b: Any, c: Any) -> Any:
     """Whether all three lie in [0, 1]: edges belong to both neighbours, as in the original."""
     return a >= _ZERO and b >= _ZERO and c >= _ZERO and a <= _ONE and b <= _ONE and c <= _ONE
 
@@ -42,11 +42,11 @@ def inside(a: Any, b: Any, c: Any) -> bool:
 def pixel_box(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
 ) -> tuple[int, int, int, int]:
-    """Pixels whose centres the triangle's box can hold: first and last column, first and last row; empty if first > last."""
-    low_x = min(x0, min(x1, x2))
-    low_y = min(y0, min(y1, y2))
-    high_x = max(x0, max(x1, x2))
-    high_y = max(y0, max(y1, y2))
+    """Pixels of the triangle's box: first and last column, first and last row; empty if first > last."""
+    low_x = min(x0, x1, x2)
+    low_y = min(y0, y1, y2)
+    high_x = max(x0, x1, x2)
+    high_y = max(y0, y1, y2)
     if not (high_x >= _ZERO and high_y >= _ZERO and low_x <= width and low_y <= height):
         return 0, -1, 0, -1
     first_x = int(max(low_x, _ZERO))

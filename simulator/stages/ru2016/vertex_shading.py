@@ -34,7 +34,7 @@ class EyeSpace(NamedTuple):
     axes : ndarray, (3, 3), float32
         Right, up and backward axis in model space, unit length.
     scales : ndarray, (3,), float32
-        Lengths of rows 0, 1 and 3 of the matrix: clip = scale x eye coordinate. The last is 0 for a parallel projection.
+        Lengths of rows 0, 1 and 3 of the matrix: clip = scale x eye coordinate; the last is 0 without perspective.
     """
 
     axes: NDArray[np.float32]

@@ -79,13 +79,13 @@ class TileQueues(NamedTuple):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def depth_24_bit(z: Any) -> int:
-    """A depth in [0, 1] as the original keeps it."""
+    """Round a depth in [0, 1] as the original keeps it."""
     return int(min(max(z, _ZERO), _ONE) * DEPTH_STEPS)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _corner(edge: Any, left: Any, bottom: Any, far: bool) -> Any:
-    """An edge function at the tile's corner that lies farthest inside, or farthest outside."""
+    """Evaluate an edge function at the tile's corner that lies farthest inside, or farthest outside."""
     side = np.float32(TILE)
     x = left + side if (edge[0] >= _ZERO) != far else left
     y = bottom + side if (edge[1] >= _ZERO) != far else bottom
@@ -248,7 +248,7 @@ def coarse_rasterizer(
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], sub_queues: int, simt: Simt) -> None:
-    """What follows from the counts: appends, one atomicAdd a round, memory."""
+    """Add what follows from the counts: appends, one atomicAdd a round, memory."""
     event = CoarseRasterizerEvent
     segment = 128 if simt.coalescing == 2 else 32
     appended = counts.reshape(len(counts), -1, simt.warp)

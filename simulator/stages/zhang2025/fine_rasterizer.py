@@ -174,7 +174,7 @@ def _band(
     edges: Any, planes: Any, starts: Any, entries: Any, tile_columns: int, tile_row: int, warp: int, early_z: bool,
     optimized: bool, masks: Any, depth: Any, events: Any,
 ) -> None:  # fmt: skip
-    """A row of tiles; ``events`` (tile columns, ...) of this row alone."""
+    """Rasterize a row of tiles; ``events`` (tile columns, ...) of this row alone."""
     for column in range(len(events)):
         i = tile_row * tile_columns + column
         queue = entries[starts[i] : starts[i + 1]]
@@ -245,7 +245,7 @@ def fine_rasterizer(
 
 
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
-    """What follows from the counts: one atomicAdd a round, memory."""
+    """Add what follows from the counts: one atomicAdd a round, memory."""
     event = FineRasterizerEvent
     segment = 128 if simt.coalescing == 2 else 32
     rounds, quads = events[..., event.ROUNDS], events[..., event.QUADS]

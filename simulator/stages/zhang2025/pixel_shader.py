@@ -114,7 +114,7 @@ def _coordinates(planes: Any, place: Any, uv: Any) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _light(planes: Any, x: Any, y: Any) -> Any:
-    """A light at the eye; the factor w of the normal cancels in its direction."""
+    """Light from the eye; the factor w of the normal cancels in its direction."""
     nx, ny = evaluate(planes[NORMAL], x, y), evaluate(planes[NORMAL + 1], x, y)
     nz = evaluate(planes[NORMAL + 2], x, y)
     length = nx * nx + ny * ny + nz * nz
@@ -256,19 +256,21 @@ def pixel_shader(
     )  # fmt: skip
     _add_costs(events, simt, optimized)
     total = events.sum(axis=0)
-    texture = int(total[PixelShaderEvent.TEXTURE_BYTES])
+    texels = min(
+        int(total[PixelShaderEvent.TEXTURE_BYTES]), len(chains.texels) * TEXEL_BYTES
+    )  # neighbours reuse them at once
     streams = (
         Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
-        Stream("texture", "load", texture, min(texture, len(chains.texels) * TEXEL_BYTES)),
+        Stream("texture", "load", texels, texels),
         Stream("fragments_out", "store", 4 * count * FRAGMENT_OUT_BYTES, 4 * count * FRAGMENT_OUT_BYTES),
-        Stream("pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), 4 * pixels),
+        Stream("pixel_base", "atomic", 16 * count, min(16 * count, 4 * pixels)),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     return stream, Work("PixelShader", kernel, PixelShaderEvent, events, blocks, BLOCK, streams=streams)
 
 
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
-    """What follows from the counts: fragments in and out, the links."""
+    """Add what follows from the counts: fragments in and out, the links."""
     event = PixelShaderEvent
     warps, lanes = events[:, event.WARPS], events[:, event.WARP_LANES]
     events[:, event.EMPTY_WARPS] = BLOCK // simt.warp - warps

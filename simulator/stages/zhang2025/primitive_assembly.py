@@ -1,4 +1,4 @@
-"""PrimitiveAssembly: triangles, frustum clipping, backface culling (Zhang 2025, stage 2). One thread a triangle, 256 a block.
+"""PrimitiveAssembly: triangles, frustum clipping, backface culling (Zhang 2025, stage 2): one thread a triangle.
 
 A triangle that stays whole keeps its own slot of the primitive buffer; the pieces of a clipped one go behind all slots,
 by one global atomicAdd a clipped triangle. Culled slots are marked and left to PrimitiveCompaction. The original drops
@@ -180,11 +180,10 @@ def primitive_assembly(
     stores = events[:, PrimitiveAssemblyEvent.PIECES] * (PRIMITIVE_BYTES // 4)  # a lane's words lie 112 bytes apart
     events[:, PrimitiveAssemblyEvent.STORE_TRANSACTIONS] = stores
     events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
-    total = events.sum(axis=0)
     streams = (
         Stream("vertices_out", "load", 3 * 64 * count, len(x) * VERTEX_BYTES),
         Stream("primitives", "store", used * PRIMITIVE_BYTES, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
     work = Work(stage, stage, PrimitiveAssemblyEvent, events, blocks, BLOCK, streams=streams)
-    return Primitives(*(array[:used] for array in out)), work
+    return Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), work

@@ -139,7 +139,7 @@ def primitive_binning(
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives: int, simt: Simt) -> None:
-    """What follows from the counts: chunks, one atomicAdd a block, memory."""
+    """Add what follows from the counts: chunks, one atomicAdd a block, memory."""
     event = PrimitiveBinningEvent
     segment = 128 if simt.coalescing == 2 else 32
     lanes = np.full(len(events), BLOCK)

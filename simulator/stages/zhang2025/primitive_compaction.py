@@ -71,7 +71,7 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
     )
     stage = "PrimitiveCompaction"
     work = Work(stage, stage, PrimitiveCompactionEvent, events, blocks, BLOCK, streams=streams)
-    return Primitives(*(array[kept] for array in slots)), work
+    return Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), work
 
 
 def most_triangles(machine: Machine) -> int:

@@ -47,7 +47,7 @@ class RopEvent(IntEnum):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
-    """The lists as PixelShader's atomicExch leaves them, in stream order."""
+    """Link the lists as PixelShader's atomicExch leaves them, in stream order."""
     height, width = heads.shape
     for q in range(len(quads)):
         for k in range(4):
@@ -210,7 +210,9 @@ def rop(
     pixels = width * height
     streams = (
         Stream("pixel_base", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments_out", "load", int(total[RopEvent.LOAD_BYTES]), 4 * len(stream.entries) * FRAGMENT_OUT_BYTES),
+        Stream(
+            "fragments_out", "load", 32 * int(total[RopEvent.LIST_LANES]), 4 * len(stream.entries) * FRAGMENT_OUT_BYTES
+        ),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
         Stream("target", "load", 16 * pixels, 16 * pixels),
         Stream("target", "store", 16 * pixels, 16 * pixels),
