@@ -20,11 +20,11 @@ class Cell:
     ----------
     row, column, unit : str
         Where it stands and what it is in.
-    published : float or None
-        As printed; None where the source prints no number.
-    ours : float
+    published : float, str or None
+        As printed; an order or a name where that is what the source says; None where it says nothing.
+    ours : float or str
     status : {"predicted", "fitted", "reported"}
-        ``fitted``: a parameter was chosen on this cell, so its error says nothing; ``reported``: nothing to compare with.
+        ``fitted``: a parameter was chosen on this cell, so its error says nothing; ``reported``: there is no aim.
     aim : float or None
         Relative error aimed at.
     """
@@ -32,22 +32,26 @@ class Cell:
     row: str
     column: str
     unit: str
-    published: float | None
-    ours: float
+    published: float | str | None
+    ours: float | str
     status: Status = "predicted"
     aim: float | None = None
 
     @property
     def error(self) -> float | None:
-        """Relative error, None where there is nothing to compare with."""
-        if self.published is None or self.published == 0:
+        """Relative error, None where there is no number to compare with."""
+        if isinstance(self.published, str) or isinstance(self.ours, str) or not self.published:
             return None
         return self.ours / self.published - 1.0
 
     @property
     def missed(self) -> bool:
-        """Whether a predicted cell lies outside its aim."""
-        return self.status == "predicted" and self.aim is not None and abs(self.error or 0.0) > self.aim
+        """Whether a predicted cell lies outside its aim, or names something else than the source."""
+        if self.status != "predicted":
+            return False
+        if isinstance(self.published, str):
+            return self.published != self.ours
+        return self.aim is not None and abs(self.error or 0.0) > self.aim
 
 
 @dataclass(frozen=True)

@@ -98,5 +98,13 @@ def cell_texts(cell: Cell) -> tuple[str, ...]:
     """A cell as the texts of its columns."""
     error = "" if cell.error is None else f"{100 * cell.error:+.1f} %"
     aim = "" if cell.aim is None else f"{100 * cell.aim:.0f} %"
-    published = "" if cell.published is None else f"{cell.published:,.4g}"
-    return (cell.row, cell.column, cell.unit, published, f"{cell.ours:,.4g}", error, cell.status, aim)
+    if isinstance(cell.published, str):
+        error = "as published" if cell.published == cell.ours else "differs"
+    return (cell.row, cell.column, cell.unit, _number(cell.published), _number(cell.ours), error, cell.status, aim)
+
+
+def _number(value: float | str | None) -> str:
+    """A value as text: four digits, thousands apart."""
+    if value is None or isinstance(value, str):
+        return value or ""
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"

@@ -9,8 +9,10 @@ TEMPLATE = """<!doctype html>
 <style>
  body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
  h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; border-top: 1px solid #ddd; padding-top: 1.2rem; }
- table { border-collapse: collapse; font-size: 13px; margin: .8rem 0; } td, th { padding: .15rem .6rem; text-align: right; }
- th { border-bottom: 1px solid #999; } td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
+ table { border-collapse: collapse; font-size: 13px; margin: .8rem 0; }
+ td, th { padding: .15rem .6rem; text-align: right; }
+ th { border-bottom: 1px solid #999; }
+ td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
  tr.fitted td { color: #888; font-style: italic; } tr.missed td.error { color: #b00020; font-weight: 600; }
  img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
  footer { color: #777; font-size: 12px; margin-top: 3rem; }
@@ -22,8 +24,8 @@ TEMPLATE = """<!doctype html>
 <p class="note">{{ result.source }}</p>
 {% for note in result.warnings %}<p class="standin">{{ note }}</p>{% endfor %}
 {% if result.rows %}<table><tr>{% for column in result.columns %}<th>{{ column }}</th>{% endfor %}</tr>
-{% for row in result.rows %}<tr class="{{ row.marks }}">{% for value in row.cells %}<td{% if loop.index0 == result.error_column %}
- class="error"{% endif %}>{{ value }}</td>{% endfor %}</tr>
+{% for row in result.rows %}<tr class="{{ row.marks }}">{% for value in row.cells %}
+<td{% if loop.index0 == result.error_column %} class="error"{% endif %}>{{ value }}</td>{% endfor %}</tr>
 {% endfor %}</table>{% endif %}
 {% for figure in result.figures %}<p><img src="{{ figure }}" alt="{{ figure }}"></p>{% endfor %}
 {% for note in result.notes %}<p>{{ note }}</p>{% endfor %}

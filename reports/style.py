@@ -8,7 +8,7 @@ from typing import Any
 PALETTE = ("#1f5aa6", "#d95f02", "#1b9e77", "#7b5ea7", "#c2185b", "#8d6e2f", "#4f6d7a", "#000000")
 PUBLISHED = {"marker": "D", "markerfacecolor": "none", "markeredgecolor": "black", "markersize": 7, "linestyle": "none"}
 HEAT = "magma"
-SETTINGS = {
+SETTINGS: dict[str, Any] = {
     "figure.figsize": (7.2, 4.4),
     "figure.dpi": 110,
     "savefig.dpi": 150,
@@ -45,7 +45,8 @@ def figure(path: Path, title: str, **layout: Any) -> Iterator[Any]:
     import matplotlib.pyplot as plt
     from cycler import cycler
 
-    with mpl.rc_context({**SETTINGS, "axes.prop_cycle": cycler(color=PALETTE)}):
+    settings: Any = SETTINGS | {"axes.prop_cycle": cycler(color=PALETTE)}
+    with mpl.rc_context(settings):
         fig, axes = plt.subplots(**layout)
         try:
             yield axes

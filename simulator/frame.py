@@ -1,12 +1,13 @@
 """A frame: what a pipeline made, before anything is priced."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.work import Work
+from simulator.work import FixedFunctionWork, Work
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Frame:
         Row 0 is the top row.
     depth : ndarray, (H, W)
         In the pipeline's own format (float32, or the original's uint32).
-    works : list of Work
+    works : sequence of Work or FixedFunctionWork
         One for each kernel launch.
     triangle_ids : ndarray, (H, W), int32, or None
         Input index of the visible triangle, -1 where nothing was drawn.
@@ -31,7 +32,7 @@ class Frame:
 
     image: NDArray[np.uint8]
     depth: NDArray[Any]
-    works: list[Work]
+    works: Sequence[Work | FixedFunctionWork]
     triangle_ids: NDArray[np.int32] | None = None
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)

@@ -84,7 +84,7 @@ class KernelMix:
         lanes = price.get("lanes", warp)
         if isinstance(lanes, str):
             if lanes not in events.__members__:
-                raise TilestampError(f"the mix of {self.kernel} counts the lanes of {event.name} by {lanes}: no such event")
+                raise TilestampError(f"the mix of {self.kernel} counts lanes of {event.name} by {lanes}: no such event")
             matrix[events[lanes], MachineEvent.LANES] += issued
         else:
             matrix[event, MachineEvent.LANES] += issued * lanes

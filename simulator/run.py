@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.events import MachineEvent
 from models.fixed_function import PipeLaunch
 from models.launch import Launch
 from models.machine import Machine, load_machine
-from models.price import price
+from models.price import Fidelity, price
 from models.timing import Timing
 from simulator.frame import Frame
 from simulator.mix import load_mix
@@ -31,7 +30,7 @@ class Run:
     machine: Machine
     width: int
     height: int
-    fidelity: str
+    fidelity: Fidelity
     options: dict[str, Any]
     frame: Frame
     note: str = ""
@@ -85,7 +84,7 @@ class Run:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
 
-    def on(self, machine: Machine | str, fidelity: str | None = None) -> "Run":
+    def on(self, machine: Machine | str, fidelity: Fidelity | None = None) -> "Run":
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
         machine = load_machine(machine) if isinstance(machine, str) else machine
         return replace(self, machine=machine, fidelity=fidelity or self.fidelity)

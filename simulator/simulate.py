@@ -1,15 +1,15 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
-from typing import Any, Literal
+from typing import Any
 
 from models.errors import TilestampError
 from models.machine import Machine, load_machine
+from models.price import FIDELITIES, Fidelity
 from simulator.pipelines import load_pipeline, pipeline_options
 from simulator.run import Run
 from simulator.scenes import Scene, load_scene, read_camera
 
-Fidelity = Literal["counts", "bounds", "schedule"]
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
 
 
@@ -67,8 +67,8 @@ def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[
     known = pipeline_options(pipeline)
     for name in options.keys() - known.keys():
         raise TilestampError(f"the pipeline {pipeline} has no option {name}; it has {', '.join(known)}")
-    if fidelity not in ("counts", "bounds", "schedule"):
-        raise TilestampError(f"fidelity is counts, bounds or schedule, not {fidelity}")
+    if fidelity not in FIDELITIES:
+        raise TilestampError(f"fidelity is {', '.join(FIDELITIES)}, not {fidelity}")
     if width < 1 or height < 1:
         raise TilestampError(f"an image of {width}x{height} pixels has no pixels")
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

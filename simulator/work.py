@@ -1,4 +1,4 @@
-"""What a stage did: a work table, a row a unit of work, a column for each of its own events; or items of a fixed pipe."""
+"""What a stage did: a work table, a row a unit of work, a column an event of its own; or items of a fixed pipe."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum

@@ -101,8 +101,6 @@ def render(
     named |= {"hybrid": hybrid, "cull_backfaces": cull_backfaces}
     options = {key: value for key, value in named.items() if value is not None}
     options |= dict(parse_assignment(text) for text in option)
-    if map_ is not None:
-        options["maps"] = (map_,)
     with progress(f"drawing {scene}") as say:
         run = _simulate(scene, pipeline, machine, set_, (width, height), camera, fidelity, options)
         say("pricing")

@@ -41,7 +41,8 @@ def reproduce(
             results.append(result)
         page = write_index(results, output)
     if json_:
-        sys.stdout.write(json.dumps({r.name: [dict(zip(COLUMNS, cell_texts(c), strict=True)) for c in r.cells] for r in results}))
+        cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
+        sys.stdout.write(json.dumps(cells) + "\n")
         return
     for result in results:
         _print_result(result)

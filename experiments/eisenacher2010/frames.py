@@ -10,7 +10,7 @@ from simulator.simulate import simulate
 SOURCE = "Eisenacher & Loop, Data-parallel Micropolygon Rasterization, Eurographics 2010 short papers"
 MACHINE = "gtx280"
 OVERHEAD_MS = 4.6  # published: table 3, system overhead at 1600x1200
-OVERHEAD_PIXELS = 1600 * 1200  # assumed: the overhead is the copy of the picture to the screen, so it goes with the pixels
+OVERHEAD_PIXELS = 1600 * 1200  # assumed: the overhead is a copy of the picture, so it goes with the pixels
 
 
 @cache
@@ -33,7 +33,7 @@ def frame(
     edges: str = "computed",
     hybrid: bool = False,
 ) -> Run:
-    """One frame of the paper; ``pixel_extent`` is the reading of its bound that fits its counts (``scenes/views.py``)."""
+    """One frame of the paper; ``pixel_extent`` is the reading of its bound that fits its counts (``scenes.views``)."""
     scene = model(name)
     return simulate(
         scene,

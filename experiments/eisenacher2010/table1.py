@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 from experiments.eisenacher2010.frames import SOURCE, frame, stage_ms, stand_in_warnings
 from experiments.published import published
 from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
+from experiments.result import Cell, Figure, Result, Status
 from reports.plots import lines
+from simulator.work import Work
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 SUBPATCHES = 270_000  # as printed
 FITTED_TILES = (4, 32)  # the two atomic parameters of gtx280.toml were chosen on these address calculation times
 COUNT_AIM, TIME_AIM = 0.02, 0.10
-CONFLICTS = {"lanes that conflict": "ATOMIC_CONFLICTS", "passes by 32-byte lock": "LOCK_DEPTH", "requests": "ATOMIC_REQUESTS"}
+CONFLICTS = {
+    "lanes that conflict": "ATOMIC_CONFLICTS",
+    "passes by 32-byte lock": "LOCK_DEPTH",
+    "requests": "ATOMIC_REQUESTS",
+}
 
 
 def run(progress: Progress) -> Result:
@@ -43,10 +48,16 @@ def run(progress: Progress) -> Result:
         cells,
         [Figure("address_calculation", lambda path: _draw(table, path))],
         [
-            "Why large tiles are slower: fewer requests are sent, but more of them want a lock that is taken; the fullest "
-            f"lock has {_growth(table)} as many requests at 32-pixel tiles as at 4.",
-            "The form of the atomic model (conflicts in a warp, and a queue at the fullest lock) was chosen with all four "
-            "cells in sight; only its two numbers were fitted, on the cells so marked.",
+            (
+                "Why large tiles are slower: fewer requests are sent, but more of them want a lock that is taken; "
+                "the fullest "
+                f"lock has {_growth(table)} as many requests at 32-pixel tiles as at 4."
+            ),
+            (
+                "The form of the atomic model (conflicts in a warp, and a queue at the fullest lock) was chosen "
+                "with all four "
+                "cells in sight; only its two numbers were fitted, on the cells so marked."
+            ),
             "Patches written at 8-pixel tiles are fitted: the camera's distance was chosen on that count.",
         ],
         stand_in_warnings("killeroo"),
@@ -65,19 +76,22 @@ def _cells(line: "pd.Series[float]", made: "Run") -> list[Cell]:
     tile = int(line.tile_size)
     written = made.frame.facts["patches_written"]
     per_patch = written / made.frame.facts["subpatches"]
-    fitted = "fitted" if tile in FITTED_TILES else "predicted"
+    fitted: Status = "fitted" if tile in FITTED_TILES else "predicted"
     row = f"{tile}x{tile}"
     return [
-        Cell(row, "address calculation", "ms", line.address_calc_ms, stage_ms(made, "bucket_count"), fitted, TIME_AIM),  # type: ignore[arg-type]
+        Cell(row, "address calculation", "ms", line.address_calc_ms, stage_ms(made, "bucket_count"), fitted, TIME_AIM),
         Cell(row, "bucket write", "ms", line.bucket_write_ms, stage_ms(made, "bucket_write"), "predicted", TIME_AIM),
-        Cell(row, "patches written", "", line.patches_written, written, "fitted" if tile == 8 else "predicted", COUNT_AIM),
+        Cell(
+            row, "patches written", "", line.patches_written, written, "fitted" if tile == 8 else "predicted", COUNT_AIM
+        ),
         Cell(row, "tiles per patch", "", line.tiles_per_patch, per_patch, "predicted", COUNT_AIM),
     ]
 
 
 def _why(made: "Run") -> dict[str, float]:
     """What makes the address calculation slow."""
-    fullest = max(int(w.atomic_requests.max()) for w in made.frame.works if getattr(w, "atomic_requests", None) is not None)
+    queues = [work.atomic_requests for work in made.frame.works if isinstance(work, Work)]
+    fullest = max(int(queue.max()) for queue in queues if queue is not None)
     counts = {label: made.counts[f"bucket_count.{name}"] for label, name in CONFLICTS.items()}
     return {"ours": stage_ms(made, "bucket_count"), "fullest lock": fullest, **counts}
 
