@@ -45,14 +45,14 @@ def test_two_percent_of_an_8x8_stamp_is_a_square_of_two_pixels():
     assert eisenacher._area_at(0.02) == pytest.approx(1.92, abs=0.1)
 
 
-def test_the_mask_gains_less_on_narrow_polygons():
-    assert aspect._measure(0.5, 32)["gain"] < aspect._measure(0.5, 1)["gain"]
+def test_the_mask_gains_fewer_points_on_narrow_polygons():
+    assert aspect._measure(1.0, 32)["points"] < aspect._measure(1.0, 1)["points"]
 
 
 def test_interleaving_wins_at_long_motion_and_not_without():
     cost = {way: {r["algorithm"]: r["cost"] for r in blur._measure(way, 0.0)} for way in (0.0, 64.0)}
-    assert cost[64.0]["interleaved"] < cost[64.0]["interval"]
-    assert cost[0.0]["interleaved"] > cost[0.0]["interval"]
+    assert cost[64.0]["interleaved 256"] < cost[64.0]["interval"]
+    assert cost[0.0]["interleaved 256"] > cost[0.0]["interval"]
 
 
 def test_patches_of_squares_have_their_area_and_their_patches():

@@ -120,9 +120,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
     )
     exact = "yes" if not table.wrong_pixels_depth.any() else "NO"
     worst = 100 * (table.wrong_pixels / table.covered_pixels).max()
-    notes.append(
-        f"The depth mask draws the exact picture everywhere: {exact}. Plain: at most {worst:.2f} % of pixels wrong."
-    )
+    notes.append(f"The depth mask draws the exact picture everywhere: {exact}. Plain: at most {worst:.2f} % of pixels.")
     notes.append(
         f"Mean gains: plain {table.gain.mean():.2f}, facing {table.gain_facing.mean():.2f},"
         f" depth {table.gain_depth.mean():.2f}: what exactness gives up."

@@ -87,7 +87,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     )
     shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
     return Work(
-        "across polygons",
+        "across_polygons",
         "across_polygons",
         events,
         table,

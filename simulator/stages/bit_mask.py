@@ -104,7 +104,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
     return Work(
-        "bit mask", "bit_mask", BitMaskEvent, table, grid, block, shared, "warp_queue", streams, samples.requests
+        "bit_mask", "bit_mask", BitMaskEvent, table, grid, block, shared, "warp_queue", streams, samples.requests
     )
 
 
