@@ -40,7 +40,11 @@ def run(progress: Callable[[str], None]) -> Result:
         progress(f"rectangles of {area} pixels")
         rows += [{"area": area, "aspect": aspect, **_measure(area, aspect)} for aspect in ASPECTS]
     table = pd.DataFrame(rows)
-    cells = [Cell(f"{row['area']:g} px, {row['aspect']}:1", "gain", "x", None, row["gain"], "reported") for row in rows]
+    cells = [
+        Cell(f"{row['area']:g} px, {row['aspect']}:1", name, unit, None, row[column], "reported")
+        for row in rows
+        for column, name, unit in COLUMNS
+    ]
     notes = [
         f"{area:g} px, 1:1 to {ASPECTS[-1]}:1: relative gain {g.gain.iloc[0]:.2f} to {g.gain.iloc[-1]:.2f} in sequence,"
         f" {g.gain_warp.iloc[0]:.2f} to {g.gain_warp.iloc[-1]:.2f} with a warp in flight; points of STE gained"

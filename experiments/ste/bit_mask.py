@@ -114,13 +114,14 @@ def _notes(table: pd.DataFrame) -> list[str]:
         span = f"{rows.gain.min():.2f} to {rows.gain.max():.2f}"
         notes.append(f"{key}: gains of {span}; within 10 % of the published {wanted:g}: {places or 'nowhere'}.")
     notes.append(
-        "Of the boxes that reach a pixel in one layer, the one that hits comes half way through on average, so a mask in"
-        " sequence spares half of the tests at most: a gain of 2 (derived). The cube's published 3 needs something that"
-        " the paper does not say."
+        "Of the boxes of one layer at a pixel, the one that hits comes half way on average, so a mask in sequence"
+        " spares half of the tests: a gain of 2 at most (derived). The published 3 needs what the paper does not say."
     )
     exact = "yes" if not table.wrong_pixels_depth.any() else "NO"
     worst = 100 * (table.wrong_pixels / table.covered_pixels).max()
-    notes.append(f"The depth mask draws the exact picture everywhere: {exact}. Plain: at most {worst:.2f} % of pixels.")
+    notes.append(
+        f"The depth mask is exact everywhere: {exact}. The plain mask errs in at most {worst:.2f} % of pixels."
+    )
     notes.append(
         f"Mean gains: plain {table.gain.mean():.2f}, facing {table.gain_facing.mean():.2f},"
         f" depth {table.gain_depth.mean():.2f}: what exactness gives up."
