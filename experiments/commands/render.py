@@ -127,7 +127,7 @@ def _simulate(
 ) -> Run:
     """Load the machine with its what-ifs and simulate."""
     from models.machine import altered, load_machine
-    from simulator.simulate import simulate
+    from simulator.simulation import simulate
 
     described = load_machine(machine)
     if changes:

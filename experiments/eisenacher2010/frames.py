@@ -5,7 +5,7 @@ from functools import cache
 from simulator.run import Run
 from simulator.scenes.library import scene_or_stand_in
 from simulator.scenes.scene import Scene
-from simulator.simulate import simulate
+from simulator.simulation import simulate
 
 SOURCE = "Eisenacher & Loop, Data-parallel Micropolygon Rasterization, Eurographics 2010 short papers"
 MACHINE = "gtx280"

@@ -15,7 +15,7 @@ from simulator.run import Run
 from simulator.scenes.camera import Camera, LookAt, fit_camera
 from simulator.scenes.library import load_scene
 from simulator.scenes.scene import Mesh, Scene
-from simulator.simulate import Fidelity, simulate
+from simulator.simulation import Fidelity, simulate
 
 MACHINE = "gt750m"
 SIZE = 800  # pixels

@@ -14,7 +14,7 @@ from models.errors import TilestampError
 from simulator.run import Run
 from simulator.scenes.library import load_scene
 from simulator.scenes.scene import Mesh, Scene
-from simulator.simulate import simulate
+from simulator.simulation import simulate
 
 WIDTH, HEIGHT = 1920, 1080
 CANDIDATES = ("ga104", "rtx3080")

@@ -7,6 +7,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
+from simulator.scenes.library import with_mesh
 from simulator.scenes.scene import Mesh, Scene
 
 ALPHA = np.float32(0.5)  # of colours made here, as in the published benchmarks
@@ -46,16 +47,17 @@ def _add_normals(positions: Any, triangles: Any, normals: Any) -> None:
 
 
 def triangle_mesh(scene: Scene) -> Mesh:
-    """Return the scene's mesh.
+    """Return the scene's mesh; patches are cut into triangles where there is none.
 
     Raises
     ------
     TilestampError
         Where the scene has no triangles.
     """
-    if scene.mesh is None or len(scene.mesh.triangles) == 0:
+    mesh = with_mesh(scene).mesh
+    if mesh is None or len(mesh.triangles) == 0:
         raise TilestampError(f"the scene {scene.name} has no triangles, and this pipeline draws nothing else")
-    return scene.mesh
+    return mesh
 
 
 def clip_positions(mesh: Mesh, matrix: NDArray[np.floating]) -> NDArray[np.float32]:
