@@ -40,4 +40,4 @@ def run(progress: Callable[[str], None]) -> Result:
             f"The kernel of ambient occlusion takes {min(costs):.2f} to {max(costs):.2f} ms over the models: it is "
             "launched over the window. Published differences: 2.2 to 3.0 ms."
         )
-    return Result("ru2016/features", "Filtering and ambient occlusion", SOURCE, cells, [], notes, missing(absent))
+    return Result("ru2016-features", "Filtering and ambient occlusion", SOURCE, cells, [], notes, missing(absent))

@@ -64,4 +64,4 @@ def run(progress: Callable[[str], None]) -> Result:
             title="Eight models, three ways (GT 750M)", y_label="ms",
         ),
     )  # fmt: skip
-    return Result("ru2016/models", "Tiles against primitives", SOURCE, cells, [figure], notes, missing(absent))
+    return Result("ru2016-models", "Tiles against primitives", SOURCE, cells, [figure], notes, missing(absent))

@@ -67,7 +67,7 @@ def run(progress: Callable[[str], None]) -> Result:
         )
     runs = pd.DataFrame([{"tile": tile, "without_draws_ms": f.milliseconds, **_raster(f)} for tile, f in times.items()])
     warnings = [] if times else missing([MODEL])
-    return Result("ru2016/tile_size", "Tile size", SOURCE, cells + rows, figures, notes, warnings, {"runs": runs})
+    return Result("ru2016-tile_size", "Tile size", SOURCE, cells + rows, figures, notes, warnings, {"runs": runs})
 
 
 def _raster(frame: object) -> dict[str, float]:

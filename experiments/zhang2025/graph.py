@@ -58,7 +58,7 @@ def run(progress: Callable[[str], None]) -> Result:
     scene = bunny()
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
-        return Result("zhang2025/graph", "Stream against graph", SOURCE, [], [], [], [warning])
+        return Result("zhang2025-graph", "Stream against graph", SOURCE, [], [], [], [warning])
     machine = load_machine(MACHINE)
     progress(MACHINE)
     stages = draw(scene, MACHINE).stages.milliseconds
@@ -97,4 +97,4 @@ def run(progress: Callable[[str], None]) -> Result:
             f"machine's launch time, and {mapping:.0f} us to map and unmap the window's buffer."
         ),
     ]
-    return Result("zhang2025/graph", "Stream against graph", SOURCE, cells, [], notes, tables={"graph": table})
+    return Result("zhang2025-graph", "Stream against graph", SOURCE, cells, [], notes, tables={"graph": table})

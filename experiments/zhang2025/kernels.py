@@ -31,7 +31,7 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
-        return Result("zhang2025/kernels", "Ten kernels", SOURCE, [], [], notes, [warning])
+        return Result("zhang2025-kernels", "Ten kernels", SOURCE, [], [], notes, [warning])
     cells: list[Cell] = []
     errors: dict[str, float] = {}
     table = published("kernels").set_index("kernel")
@@ -53,7 +53,7 @@ def run(progress: Callable[[str], None]) -> Result:
     best = min(errors, key=lambda name: errors[name])
     stated = ", ".join(f"{name} a factor {error:.2f}" for name, error in errors.items())
     notes.append(f"Mean miss of a kernel (geometric): {stated}. {best} fits better.")
-    return Result("zhang2025/kernels", "Ten kernels before and after", SOURCE, cells, [_figure(cells)], notes)
+    return Result("zhang2025-kernels", "Ten kernels before and after", SOURCE, cells, [_figure(cells)], notes)
 
 
 def profile(frame: Run) -> dict[str, Timing]:

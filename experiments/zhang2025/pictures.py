@@ -35,7 +35,7 @@ def run(progress: Callable[[str], None]) -> Result:
     try:
         scene = load_scene(SCENE)
     except TilestampError as error:
-        return Result("zhang2025/pictures", "Features off and on", source, [], [], [], [str(error)])
+        return Result("zhang2025-pictures", "Features off and on", source, [], [], [], [str(error)])
     matrix = CAMERA.matrix(SIZE, SIZE)
     cells, figures = [], []
     for name, (pipeline, machine, off, on) in PAIRS.items():
@@ -45,7 +45,7 @@ def run(progress: Callable[[str], None]) -> Result:
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]
-    return Result("zhang2025/pictures", "Features off and on", source, cells, figures, notes)
+    return Result("zhang2025-pictures", "Features off and on", source, cells, figures, notes)
 
 
 def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:

@@ -79,5 +79,5 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     source = "Zhang 2025 names an optimized tile linear storage, without figures"
     return Result(
-        "zhang2025/texture_traffic", "Texture traffic by layout", source, cells, [figure], notes, [], {"traffic": table}
+        "zhang2025-texture_traffic", "Texture traffic by layout", source, cells, [figure], notes, [], {"traffic": table}
     )
