@@ -16,6 +16,7 @@ app = App(
     name="tilestamp",
     help="Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time.",
     help_format="markdown",
+    suppress_keyboard_interrupt=False,
 )
 app.command(render)
 app.command(reproduce)

@@ -1,0 +1,96 @@
+"""The command line: what a user types, what comes out, and what is said of bad input."""
+
+import json
+
+import pytest
+from PIL import Image
+
+from experiments.command_line import BAD_INPUT, run_command
+
+SMALL = ["--size", "64x48"]
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory):
+    """One picture with a map, through the command line."""
+    folder = tmp_path_factory.mktemp("render")
+    code = run_command(["render", "teapot", *SMALL, "-o", str(folder / "out.png"), "--map", "quads"])
+    return code, folder
+
+
+def test_render_writes_the_picture(rendered):
+    code, folder = rendered
+    assert code == 0
+    assert Image.open(folder / "out.png").size == (64, 48)
+
+
+def test_render_writes_the_heat_map_beside_the_picture(rendered):
+    assert (rendered[1] / "out.quads.png").exists()
+
+
+def test_json_has_stages_counts_and_milliseconds(capsys):
+    assert run_command(["render", "teapot", *SMALL, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["milliseconds"] > 0
+    assert "tile_raster" in answer["stages"]
+    assert answer["counts"]["tile_raster.GRIDS"] > 0
+
+
+def test_a_what_if_changes_the_time_and_not_the_counts(capsys):
+    answers = []
+    for change in ([], ["--set", "sm.clock_mhz=2592.0"]):
+        assert run_command(["render", "teapot", *SMALL, "--json", *change]) == 0
+        answers.append(json.loads(capsys.readouterr().out))
+    assert answers[0]["counts"] == answers[1]["counts"]
+    assert answers[1]["milliseconds"] < answers[0]["milliseconds"]
+
+
+@pytest.mark.parametrize("kind", ["scenes", "pipelines", "machines", "experiments"])
+def test_list_says_what_each_thing_is(kind, capsys):
+    assert run_command(["list", kind, "--json"]) == 0
+    lines = json.loads(capsys.readouterr().out)
+    assert lines
+    assert all(line for line in lines.values())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["render", "no-such-scene"], "no-such-scene"),
+        (["render", "missing.bpt"], "missing.bpt"),
+        (["render", "teapot", "--machine", "gtx9999"], "gtx9999"),
+        (["render", "teapot", "--pipeline", "raytracer"], "raytracer"),
+        (["render", "teapot", "--size", "big"], "--size"),
+        (["render", "teapot", "--size", "0x10"], "0x10"),
+        (["render", "teapot", "--size", "900000x900000"], "memory"),
+        (["render", "teapot", *SMALL, "--tile", "5"], "5"),
+        (["render", "teapot", *SMALL, "--spp", "3"], "3"),
+        (["render", "teapot", *SMALL, "--tile", "32"], "512 threads"),
+        (["render", "teapot", *SMALL, "--msaa", "4"], "msaa"),
+        (["render", "teapot", *SMALL, "--set", "sm.cout=3"], "sm.cout"),
+        (["render", "teapot", *SMALL, "-o", "nowhere/out.png"], "nowhere"),
+        (["render", "teapot", *SMALL, "-o", "out.gif"], ".png"),
+        (["render", "teapot", *SMALL, "--map", "quads"], "-o"),
+        (["render", "teapot", *SMALL, "--camera", "missing.json"], "missing.json"),
+        (["reproduce", "no-such-table"], "no-such-table"),
+        (["list", "planets"], "planets"),
+        (["paint"], "paint"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(arguments, names, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_command(arguments) == BAD_INPUT
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said.startswith("tilestamp: ")
+    assert names in said
+    assert "Traceback" not in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_is_one_sentence_and_exit_code_130(capsys, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("simulator.simulation.simulate", interrupted)
+    assert run_command(["render", "teapot", *SMALL]) == 130
+    assert "interrupted" in capsys.readouterr().err

@@ -1,0 +1,78 @@
+"""Mixes: events priced in machine events."""
+
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+from models.errors import TilestampError
+from models.events import MachineEvent
+from simulator.mix import MIXES, PROVENANCES, KernelMix, load_mix
+from simulator.work import Work
+
+pytestmark = pytest.mark.small
+
+
+class Event(IntEnum):
+    """Events of a made-up kernel."""
+
+    STEPS = 0
+    STEP_LANES = 1
+    LOAD_TRANSACTIONS = 2
+
+
+def kernel(**prices: dict[str, object]) -> KernelMix:
+    return KernelMix("k", 16, 0, prices, {})
+
+
+def test_an_event_costs_its_instructions():
+    matrix = kernel(STEPS={"fp32": 3, "load": 1}).matrix(Event, 32)
+    assert matrix[Event.STEPS, MachineEvent.FP32] == 3
+    assert matrix[Event.STEPS, MachineEvent.LOAD] == 1
+
+
+def test_lanes_are_instructions_times_the_event_that_counts_lanes():
+    matrix = kernel(STEPS={"fp32": 3, "load": 1, "lanes": "STEP_LANES"}).matrix(Event, 32)
+    assert matrix[Event.STEP_LANES, MachineEvent.LANES] == 4
+    assert matrix[Event.STEPS, MachineEvent.LANES] == 0
+
+
+def test_without_lanes_whole_warps_are_active():
+    assert kernel(STEPS={"int32": 2}).matrix(Event, 32)[Event.STEPS, MachineEvent.LANES] == 64
+
+
+def test_an_event_with_the_name_of_a_machine_event_passes_through():
+    assert kernel().matrix(Event, 32)[Event.LOAD_TRANSACTIONS, MachineEvent.LOAD_TRANSACTIONS] == 1
+
+
+def test_chain_steps_are_no_instructions():
+    assert kernel(STEPS={"chain_load": 2}).matrix(Event, 32)[:, MachineEvent.LANES].sum() == 0
+
+
+def test_a_price_for_an_event_that_is_not_counted_is_refused():
+    with pytest.raises(TilestampError, match="NOTHING"):
+        kernel(NOTHING={"fp32": 1}).matrix(Event, 32)
+
+
+def test_lanes_that_are_not_counted_are_refused():
+    with pytest.raises(TilestampError, match="GHOSTS"):
+        kernel(STEPS={"fp32": 1, "lanes": "GHOSTS"}).matrix(Event, 32)
+
+
+def test_a_kernel_without_a_mix_is_refused():
+    work = Work("s", "unknown", Event, np.zeros((1, 3), np.int64), 1, 32)
+    with pytest.raises(TilestampError, match="unknown"):
+        load_mix("micropolygon", "1.3").launch(work, 32)
+
+
+def test_an_older_machine_takes_the_oldest_family():
+    assert load_mix("micropolygon", "1.0").name == "micropolygon/cc1"
+
+
+@pytest.mark.parametrize("path", sorted(MIXES.glob("*/cc*.toml")), ids=lambda p: f"{p.parent.name}-{p.stem}")
+def test_every_mix_says_where_each_number_comes_from(path):
+    mix = load_mix(path.parent.name, path.stem.removeprefix("cc"))
+    for kernel_mix in mix.kernels.values():
+        for kind, source in kernel_mix.provenance.values():
+            assert kind in PROVENANCES
+            assert source

@@ -1,0 +1,83 @@
+"""Results: cells, what is averaged, what is written."""
+
+import json
+
+import pandas as pd
+import pytest
+
+from experiments.registry import describe, experiment_names, select
+from experiments.result import Cell, Result
+from experiments.write import cell_texts, write_index, write_result
+from models.errors import TilestampError
+
+
+def cell(published: float | str | None = 10.0, ours: float | str = 11.0, status: str = "predicted") -> Cell:
+    return Cell("row", "column", "ms", published, ours, status, 0.05)
+
+
+def result(*cells: Cell) -> Result:
+    return Result("paper-table", "A table", "A paper", list(cells), tables={"more": pd.DataFrame({"a": [1]})})
+
+
+def test_the_error_is_relative():
+    assert cell().error == pytest.approx(0.1)
+
+
+def test_a_predicted_cell_outside_its_aim_is_missed():
+    assert cell().missed
+    assert not cell(ours=10.2).missed
+
+
+def test_a_fitted_cell_is_never_missed_and_never_averaged():
+    fitted = cell(status="fitted")
+    assert not fitted.missed
+    assert result(fitted, cell()).predicted_errors == [pytest.approx(0.1)]
+
+
+def test_an_order_that_differs_is_missed():
+    assert cell("a < b", "b < a").missed
+    assert not cell("a < b", "a < b").missed
+    assert cell("a < b", "b < a").error is None
+
+
+def test_texts_show_error_and_status():
+    assert "+10.0 %" in cell_texts(cell())
+    assert "fitted" in cell_texts(cell(status="fitted"))
+
+
+def test_a_result_is_written_as_csv_and_manifest(tmp_path):
+    folder = write_result(result(cell()), tmp_path, {"names": []})
+    assert pd.read_csv(folder / "cells.csv")["ours"].tolist() == [11.0]
+    assert (folder / "more.csv").exists()
+    assert json.loads((folder / "manifest.json").read_text())["source_digest"]
+
+
+def test_a_result_replaces_the_one_before(tmp_path):
+    (write_result(result(cell()), tmp_path, {}) / "stale.csv").write_text("old")
+    assert not (write_result(result(cell()), tmp_path, {}) / "stale.csv").exists()
+
+
+def test_the_page_holds_every_cell(tmp_path):
+    text = write_index([result(cell(ours=12.5))], tmp_path).read_text()
+    assert "12.5" in text
+    assert "A table" in text
+
+
+def test_an_experiment_is_found_by_paper_and_by_table():
+    name = experiment_names()[0]
+    assert name in select((name.split("/")[0],))
+    assert name in select((name.split("/")[1],))
+
+
+def test_nothing_named_is_everything():
+    assert select(()) == experiment_names()
+
+
+def test_an_unknown_experiment_is_refused():
+    with pytest.raises(TilestampError, match="nothing-such"):
+        select(("nothing-such",))
+
+
+@pytest.mark.parametrize("name", experiment_names())
+def test_every_experiment_says_what_it_is(name):
+    assert describe(name).endswith(".")
