@@ -1,6 +1,11 @@
-"""Bicubic Bezier patches by parameter: restriction to a square of the parameter domain, basis and tangent rows."""
+"""Bicubic Bezier patches by parameter: restriction to a square of the parameter domain, basis and tangent rows.
 
-from typing import Any
+Sixteen sub-patches are worked on side by side: arrays end in an axis of ``LANES``, and each innermost loop runs over
+it. LLVM makes vectors of such loops, but unrolls what it knows to have few turns: so lengths are read from the arrays,
+whose shape drivers give. Each lane does the same float32 operations in the same order as one alone would.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -8,156 +13,179 @@ from numpy.typing import ArrayLike, NDArray
 
 from models.errors import TilestampError
 
+LANES = 16  # sub-patches side by side
+POINTS = 16  # control points of a patch, vertices of a grid
 THREE = np.float32(3.0)
 TWO = np.float32(2.0)
 ONE = np.float32(1.0)
 
 
-@njit(cache=True, nogil=True)
-def restriction(a: Any, b: Any, rows: Any) -> Any:
-    """Fill ``rows`` (4, 4) so that ``q[k] = sum_x rows[x, k] p[x]`` are the control points over [a, b] (blossoms)."""
-    A = ONE - a
-    B = ONE - b
-    rows[0, 0], rows[1, 0], rows[2, 0], rows[3, 0] = A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
-    rows[0, 1], rows[1, 1], rows[2, 1], rows[3, 1] = (
-        A * A * B,
-        A * (A * b + TWO * a * B),
-        a * (a * B + TWO * A * b),
-        a * a * b,
-    )
-    rows[0, 2], rows[1, 2], rows[2, 2], rows[3, 2] = (
-        A * B * B,
-        B * (a * B + TWO * A * b),
-        b * (A * b + TWO * a * B),
-        a * b * b,
-    )
-    rows[0, 3], rows[1, 3], rows[2, 3], rows[3, 3] = B * B * B, THREE * b * B * B, THREE * b * b * B, b * b * b
+class Squares(NamedTuple):
+    """Sub-patches side by side: (i, j) * side is the corner of a square of the parameter domain."""
+
+    patch: NDArray[np.int32]  # (LANES,)
+    i: NDArray[np.int32]
+    j: NDArray[np.int32]
+    side: NDArray[np.float32]  # a power of two, so that the ends of the unit interval are exact
 
 
 @njit(cache=True, nogil=True)
+def new_squares(lanes: Any) -> Any:
+    """Scratch for sub-patches."""
+    return Squares(
+        np.zeros(lanes, np.int32), np.zeros(lanes, np.int32), np.zeros(lanes, np.int32), np.ones(lanes, np.float32)
+    )
+
+
+@njit(cache=True, nogil=True)
+def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
+    """Put sub-patch ``n`` of the queue in a lane."""
+    squares.patch[lane] = queue.patch[n]
+    squares.i[lane], squares.j[lane] = queue.i[n], queue.j[n]
+    squares.side[lane] = ONE / np.float32(1 << queue.level[n])
+
+
+@njit(cache=True, nogil=True)
+def gather(points: Any, patch: Any, net: Any) -> Any:
+    """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
+    for lane in range(net.shape[2]):
+        p = patch[lane]
+        for d in range(net.shape[0]):
+            for k in range(POINTS):
+                net[d, k, lane] = points[p, d, k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def restriction(first: Any, side: Any, rows: Any) -> Any:
+    """Tables of the intervals [a, b] = [first * side, (first + 1) * side] by blossoms.
+
+    Fill ``rows`` (4, 4, LANES) so that ``q[k] = sum_x rows[x, k] p[x]`` are the control points over the interval.
+    """
+    for n in range(side.shape[0]):
+        a, b = np.float32(first[n]) * side[n], np.float32(first[n] + np.int32(1)) * side[n]
+        A, B = ONE - a, ONE - b
+        rows[0, 0, n], rows[1, 0, n], rows[2, 0, n], rows[3, 0, n] = _bernstein(a, A)
+        rows[0, 1, n], rows[1, 1, n] = A * A * B, A * (A * b + TWO * a * B)
+        rows[2, 1, n], rows[3, 1, n] = a * (a * B + TWO * A * b), a * a * b
+        rows[0, 2, n], rows[1, 2, n] = A * B * B, B * (a * B + TWO * A * b)
+        rows[2, 2, n], rows[3, 2, n] = b * (A * b + TWO * a * B), a * b * b
+        rows[0, 3, n], rows[1, 3, n], rows[2, 3, n], rows[3, 3, n] = _bernstein(b, B)
+
+
+@njit(cache=True, nogil=True)
+def _bernstein(a: Any, A: Any) -> Any:
+    return A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
-    """Bernstein polynomials at four evenly spaced parameters of the interval [first * side, (first + 1) * side].
+    """Bernstein polynomials at four evenly spaced parameters of the intervals [first * side, (first + 1) * side].
 
     Parameters
     ----------
-    first : int
-    side : float32
-        A power of two, so that the ends of the unit interval are exact.
-    rows : ndarray, (4, 4), float32
+    first : ndarray, (LANES,), int32
+    side : ndarray, (LANES,), float32
+    rows : ndarray, (4, 4, LANES), float32
         Filled: ``rows[x, k]`` weighs control point x at parameter k.
-    slopes : ndarray, (3, 4), float32
+    slopes : ndarray, (3, 4, LANES), float32
         Filled: ``slopes[x, k]`` weighs the difference of control points x + 1 and x in a third of the derivative.
     """
     for k in range(4):
-        a = np.float32(3 * first + k) * side / THREE
-        A = ONE - a
-        rows[0, k], rows[1, k], rows[2, k], rows[3, k] = A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
-        slopes[0, k], slopes[1, k], slopes[2, k] = A * A, TWO * a * A, a * a
+        for n in range(side.shape[0]):
+            set_parameter(rows, slopes, k, n, np.float32(np.int32(3) * first[n] + np.int32(k)) * side[n] / THREE)
 
 
 @njit(cache=True, nogil=True)
-def _along_v(points: Any, d: Any, by_v: Any, between: Any) -> Any:
-    """Contract the rows of coordinate d of a net: ``between[4 r + x]``.
+def set_parameter(rows: Any, slopes: Any, k: Any, n: Any, a: Any) -> Any:
+    """Fill the tables of lane ``n`` for its parameter ``k``, which is ``a``."""
+    A = ONE - a
+    rows[0, k, n], rows[1, k, n], rows[2, k, n], rows[3, k, n] = _bernstein(a, A)
+    slopes[0, k, n], slopes[1, k, n], slopes[2, k, n] = A * A, TWO * a * A, a * a
 
-    Here and below: indices instead of views, whose reference counts would cost more than the sums; and four sums
-    before four stores, so that LLVM makes them one vector.
-    """
-    for r in range(4):
-        v0, v1, v2, v3 = by_v[0, r], by_v[1, r], by_v[2, r], by_v[3, r]
-        x0 = v0 * points[d, 0] + v1 * points[d, 4] + v2 * points[d, 8] + v3 * points[d, 12]
-        x1 = v0 * points[d, 1] + v1 * points[d, 5] + v2 * points[d, 9] + v3 * points[d, 13]
-        x2 = v0 * points[d, 2] + v1 * points[d, 6] + v2 * points[d, 10] + v3 * points[d, 14]
-        x3 = v0 * points[d, 3] + v1 * points[d, 7] + v2 * points[d, 11] + v3 * points[d, 15]
-        q = 4 * r
-        between[q], between[q + 1], between[q + 2], between[q + 3] = x0, x1, x2, x3
+
+@njit(cache=True, nogil=True)
+def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
+    """Contract the rows of coordinate d of a net: ``between[r, x]``."""
+    for r in range(between.shape[0]):
+        for x in range(between.shape[1]):
+            for n in range(between.shape[2]):
+                between[r, x, n] = (
+                    by_v[0, r, n] * net[d, x, n]
+                    + by_v[1, r, n] * net[d, x + 4, n]
+                    + by_v[2, r, n] * net[d, x + 8, n]
+                    + by_v[3, r, n] * net[d, x + 12, n]
+                )
 
 
 @njit(cache=True, nogil=True)
 def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
     """Contract the columns: ``out[d, 4 r + c]``."""
-    for r in range(4):
-        q = 4 * r
-        p0, p1, p2, p3 = between[q], between[q + 1], between[q + 2], between[q + 3]
-        c0 = by_u[0, 0] * p0 + by_u[1, 0] * p1 + by_u[2, 0] * p2 + by_u[3, 0] * p3
-        c1 = by_u[0, 1] * p0 + by_u[1, 1] * p1 + by_u[2, 1] * p2 + by_u[3, 1] * p3
-        c2 = by_u[0, 2] * p0 + by_u[1, 2] * p1 + by_u[2, 2] * p2 + by_u[3, 2] * p3
-        c3 = by_u[0, 3] * p0 + by_u[1, 3] * p1 + by_u[2, 3] * p2 + by_u[3, 3] * p3
-        out[d, q], out[d, q + 1], out[d, q + 2], out[d, q + 3] = c0, c1, c2, c3
+    for r in range(between.shape[0]):
+        for c in range(between.shape[1]):
+            for n in range(between.shape[2]):
+                out[d, 4 * r + c, n] = (
+                    by_u[0, c, n] * between[r, 0, n]
+                    + by_u[1, c, n] * between[r, 1, n]
+                    + by_u[2, c, n] * between[r, 2, n]
+                    + by_u[3, c, n] * between[r, 3, n]
+                )
 
 
 @njit(cache=True, nogil=True)
-def restrict(points: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
-    """Tensor product: control points of a sub-patch by ``restriction`` tables, points of a grid by ``basis`` tables.
+def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
+    """Tensor product: control points of sub-patches by ``restriction`` tables, points of grids by ``basis`` tables.
 
     Parameters
     ----------
-    points : ndarray, (>= D, 16), float32
-        Control net, a coordinate a row.
-    by_u, by_v : ndarray, (4, 4), float32
-    between : ndarray, (16,), float32
+    net : ndarray, (>= D, 16, LANES), float32
+        Control nets, a coordinate a row.
+    by_u, by_v : ndarray, (4, 4, LANES), float32
+    between : ndarray, (4, 4, LANES), float32
         Scratch.
-    out : ndarray, (D, 16), float32
+    out : ndarray, (D, 16, LANES), float32
     """
     for d in range(out.shape[0]):
-        _along_v(points, d, by_v, between)
+        _along_v(net, d, by_v, between)
         _along_u(between, by_u, out, d)
 
 
 @njit(cache=True, nogil=True)
 def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
     """Contract the differences of neighbouring columns."""
-    for r in range(4):
-        q = 4 * r
-        d0, d1, d2 = between[q + 1] - between[q], between[q + 2] - between[q + 1], between[q + 3] - between[q + 2]
-        c0 = slope_u[0, 0] * d0 + slope_u[1, 0] * d1 + slope_u[2, 0] * d2
-        c1 = slope_u[0, 1] * d0 + slope_u[1, 1] * d1 + slope_u[2, 1] * d2
-        c2 = slope_u[0, 2] * d0 + slope_u[1, 2] * d1 + slope_u[2, 2] * d2
-        c3 = slope_u[0, 3] * d0 + slope_u[1, 3] * d1 + slope_u[2, 3] * d2
-        out[d, q], out[d, q + 1], out[d, q + 2], out[d, q + 3] = c0, c1, c2, c3
+    for r in range(between.shape[0]):
+        for c in range(between.shape[1]):
+            for n in range(between.shape[2]):
+                p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
+                out[d, 4 * r + c, n] = (
+                    slope_u[0, c, n] * (p1 - p0) + slope_u[1, c, n] * (p2 - p1) + slope_u[2, c, n] * (p3 - p2)
+                )
 
 
 @njit(cache=True, nogil=True)
-def _slopes_along_v(points: Any, d: Any, slope_v: Any, between: Any) -> Any:
+def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
     """Contract the differences of neighbouring rows."""
-    for r in range(4):
-        v0, v1, v2 = slope_v[0, r], slope_v[1, r], slope_v[2, r]
-        x0 = (
-            v0 * (points[d, 4] - points[d, 0])
-            + v1 * (points[d, 8] - points[d, 4])
-            + v2 * (points[d, 12] - points[d, 8])
-        )
-        x1 = (
-            v0 * (points[d, 5] - points[d, 1])
-            + v1 * (points[d, 9] - points[d, 5])
-            + v2 * (points[d, 13] - points[d, 9])
-        )
-        x2 = (
-            v0 * (points[d, 6] - points[d, 2])
-            + v1 * (points[d, 10] - points[d, 6])
-            + v2 * (points[d, 14] - points[d, 10])
-        )
-        x3 = (
-            v0 * (points[d, 7] - points[d, 3])
-            + v1 * (points[d, 11] - points[d, 7])
-            + v2 * (points[d, 15] - points[d, 11])
-        )
-        q = 4 * r
-        between[q], between[q + 1], between[q + 2], between[q + 3] = x0, x1, x2, x3
+    for r in range(between.shape[0]):
+        for x in range(between.shape[1]):
+            for n in range(between.shape[2]):
+                p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+                between[r, x, n] = (
+                    slope_v[0, r, n] * (p1 - p0) + slope_v[1, r, n] * (p2 - p1) + slope_v[2, r, n] * (p3 - p2)
+                )
 
 
 @njit(cache=True, nogil=True)
 def evaluate(
-    points: Any, by_u: Any, by_v: Any, slope_u: Any, slope_v: Any, between: Any, out: Any, along_u: Any, along_v: Any
+    net: Any, by_u: Any, by_v: Any, slope_u: Any, slope_v: Any, between: Any, out: Any, along_u: Any, along_v: Any
 ) -> Any:
-    """Points of a grid, and thirds of the derivatives along u and v: a coordinate of ``points`` a row of each.
+    """Points of grids, and thirds of the derivatives along u and v: a coordinate of ``net`` a row of each.
 
     Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
     """
-    for d in range(points.shape[0]):
-        _along_v(points, d, by_v, between)
+    for d in range(net.shape[0]):
+        _along_v(net, d, by_v, between)
         _along_u(between, by_u, out, d)
         _slopes_along_u(between, slope_u, along_u, d)
-        _slopes_along_v(points, d, slope_v, between)
+        _slopes_along_v(net, d, slope_v, between)
         _along_u(between, by_u, along_v, d)
 
 

@@ -19,17 +19,28 @@ from enum import IntEnum
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.bezier import restrict, restriction, screen_points
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.bezier import (
+    LANES,
+    POINTS,
+    gather,
+    new_squares,
+    restrict,
+    restriction,
+    screen_points,
+    set_square,
+)
 from simulator.stages.bucket_scan import bucket_scan
 from simulator.stages.split_counts import oracle_work, scan_works, subdivide_work, transform_work
 from simulator.work import Work
 
 BLOCK = 256  # threads, a sub-patch each
+GRID_SIDE = 4  # control points
 MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 bits
 MAX_QUEUE = 2**24  # sub-patches
 
@@ -64,6 +75,37 @@ CULL, KEEP, GIVE_UP, ACROSS, SPLIT = (int(path) for path in Path)
 _SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by path
 
 
+class _Scratch(NamedTuple):
+    """Sub-patches side by side, and what the oracle finds out about them."""
+
+    by_u: NDArray[np.float32]  # (4, 4, LANES)
+    by_v: NDArray[np.float32]
+    between: NDArray[np.float32]  # (4, 4, LANES)
+    patch_net: NDArray[np.float32]  # (3, 16, LANES) x w, y w in pixels, and w
+    net: NDArray[np.float32]  # (3, 16, LANES)
+    everywhere: NDArray[np.int32]  # (LANES,) sides of the frustum that all points lie outside of
+    anywhere: NDArray[np.int32]  # (LANES,) that a point lies outside of
+    box: NDArray[np.float32]  # (4, LANES) x0, y0, x1, y1
+
+
+_BEHIND, _NOT_FRONT = np.int32(16), np.int32(32)  # bits: w <= 0; w > 0 does not hold (it may be no number)
+_OFF_SCREEN = np.int32(31)
+
+
+@njit(cache=True, nogil=True)
+def _new_scratch(side: Any, lanes: Any) -> Any:
+    return _Scratch(
+        np.empty((4, side, lanes), np.float32),
+        np.empty((4, side, lanes), np.float32),
+        np.empty((side, side, lanes), np.float32),
+        np.empty((3, POINTS, lanes), np.float32),
+        np.empty((3, POINTS, lanes), np.float32),
+        np.empty(lanes, np.int32),
+        np.empty(lanes, np.int32),
+        np.empty((4, lanes), np.float32),
+    )
+
+
 @njit(cache=True, nogil=True)
 def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any) -> Any:
     """Whether a box satisfies the bound."""
@@ -72,63 +114,78 @@ def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any)
     return x1 - x0 < bound and y1 - y0 < bound
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure(s: Any, width: Any, height: Any) -> Any:
+    """Sides of the frustum and boxes of all lanes; a box means nothing where a point lies behind the eye."""
+    net, box = s.net, s.box
+    s.everywhere[:] = -1
+    s.anywhere[:] = 0
+    box[:2] = np.inf
+    box[2:] = -np.inf
+    for k in range(net.shape[1]):
+        for n in range(net.shape[2]):
+            x, y, w = net[0, k, n], net[1, k, n], net[2, k, n]
+            out = np.int32(x < 0) | np.int32(x > width * w) << 1 | np.int32(y < 0) << 2 | np.int32(y > height * w) << 3
+            out |= np.int32(w <= 0) << 4 | np.int32(not w > 0) << 5
+            s.everywhere[n] &= out
+            s.anywhere[n] |= out
+        for n in range(net.shape[2]):
+            scale = np.float32(1) / net[2, k, n]
+            x, y = net[0, k, n] * scale, net[1, k, n] * scale
+            box[0, n], box[1, n] = min(box[0, n], x), min(box[1, n], y)
+            box[2, n], box[3, n] = max(box[2, n], x), max(box[3, n], y)
+
+
 @njit(cache=True, nogil=True)
-def _examine(net: Any, width: Any, height: Any, bound: Any, whole_pixels: Any) -> Any:
-    """Path of a sub-patch with the control points ``net`` (3, 16): x w, y w in pixels, and w."""
-    front = behind = left = right = above = below = 0
-    for k in range(16):
-        x, y, w = net[0, k], net[1, k], net[2, k]
-        front += w > 0
-        behind += w <= 0
-        left += x < 0
-        right += x > width * w
-        above += y < 0
-        below += y > height * w
-    if behind == 16 or left == 16 or right == 16 or above == 16 or below == 16:
+def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
+    """What was found about lane ``n``."""
+    if s.everywhere[n] & _OFF_SCREEN:
         return CULL
-    if front < 16:
+    if s.anywhere[n] & _NOT_FRONT:
         return ACROSS
-    x0 = y0 = np.float32(np.inf)
-    x1 = y1 = np.float32(-np.inf)
-    for k in range(16):
-        scale = np.float32(1) / net[2, k]
-        x, y = net[0, k] * scale, net[1, k] * scale
-        x0, x1 = min(x0, x), max(x1, x)
-        y0, y1 = min(y0, y), max(y1, y)
-    return KEEP if _is_small(x0, y0, x1, y1, bound, whole_pixels) else SPLIT
+    return KEEP if _is_small(s.box[0, n], s.box[1, n], s.box[2, n], s.box[3, n], bound, whole_pixels) else SPLIT
 
 
 @njit(cache=True, nogil=True)
-def _oracle_block(
-    start: Any, stop: Any, screen: Any, queue: Any, path: Any, size: Any, bound: Any, whole_pixels: Any, max_depth: Any
+def _oracle(
+    part: Any,
+    parts: Any,
+    side: Any,
+    width: Any,
+    screen: Any,
+    queue: Any,
+    path: Any,
+    size: Any,
+    bound: Any,
+    whole_pixels: Any,
+    max_depth: Any,
 ) -> Any:
-    """Examine the sub-patches start..stop-1; one that was kept before is kept again."""
-    by_u = np.empty((4, 4), np.float32)
-    by_v = np.empty((4, 4), np.float32)
-    between = np.empty(16, np.float32)
-    net = np.empty((3, 16), np.float32)
-    for k in range(start, stop):
-        if path[k] == KEEP:
-            continue
-        side = np.float32(1) / np.float32(1 << queue.level[k])
-        restriction(np.float32(queue.i[k]) * side, np.float32(queue.i[k] + 1) * side, by_u)
-        restriction(np.float32(queue.j[k]) * side, np.float32(queue.j[k] + 1) * side, by_v)
-        restrict(screen[queue.patch[k]], by_u, by_v, between, net)
-        found = _examine(net, size[0], size[1], bound, whole_pixels)
-        path[k] = GIVE_UP if found >= ACROSS and queue.level[k] >= max_depth else found
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _oracle(screen: Any, queue: Any, path: Any, size: Any, bound: Any, whole_pixels: Any, max_depth: Any) -> Any:
-    for block in prange(-(-path.shape[0] // BLOCK)):
-        stop = min((block + 1) * BLOCK, path.shape[0])
-        _oracle_block(block * BLOCK, stop, screen, queue, path, size, bound, whole_pixels, max_depth)
+    """Examine one part of the queue, ``width`` (LANES) at once; a sub-patch that was kept before is kept again."""
+    s, squares = _new_scratch(side, width), new_squares(width)
+    picked = np.empty(LANES, np.int64)
+    k, stop = part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts
+    while k < stop:
+        lanes = 0
+        while k < stop and lanes < LANES:
+            if path[k] != KEEP:
+                set_square(squares, lanes, queue, k)
+                picked[lanes] = k
+                lanes += 1
+            k += 1
+        restriction(squares.i, squares.side, s.by_u)
+        restriction(squares.j, squares.side, s.by_v)
+        gather(screen, squares.patch, s.patch_net)
+        restrict(s.patch_net, s.by_u, s.by_v, s.between, s.net)
+        _measure(s, size[0], size[1])
+        for n in range(lanes):
+            found = _path(s, n, bound, whole_pixels)
+            path[picked[n]] = GIVE_UP if found >= ACROSS and queue.level[picked[n]] >= max_depth else found
 
 
 @njit(cache=True, nogil=True)
-def _subdivide_block(start: Any, stop: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
-    """Move what is kept, and write the four children of what is split, u first."""
-    for k in range(start, stop):
+def _subdivide(part: Any, parts: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
+    """Move what is kept, and write the four children of what is split, u first: one part of the queue."""
+    for k in range(part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts):
         place = places[k]
         if path[k] == KEEP:
             target.patch[place] = queue.patch[k]
@@ -142,13 +199,6 @@ def _subdivide_block(start: Any, stop: Any, queue: Any, path: Any, places: Any, 
                 target.i[place + child] = 2 * queue.i[k] + (child & 1)
                 target.j[place + child] = 2 * queue.j[k] + (child >> 1)
                 target_path[place + child] = CULL  # not yet examined
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _subdivide(queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
-    for block in prange(-(-path.shape[0] // BLOCK)):
-        stop = min((block + 1) * BLOCK, path.shape[0])
-        _subdivide_block(block * BLOCK, stop, queue, path, places, target, target_path)
 
 
 def bound_and_split(
@@ -202,7 +252,9 @@ def bound_and_split(
     works = [transform_work(len(points), simt)] if counting else []
     passes = []
     while True:
-        _oracle(screen, queue, path, size, limit, bound_rule == "pixel_extent", max_depth)
+        whole_pixels = bound_rule == "pixel_extent"
+        parts = parts_of(len(path), BLOCK)
+        for_parts(_oracle, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels, max_depth)
         slots = _SLOTS[path]
         places, scan = bucket_scan(slots, simt, counting=counting)
         culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
@@ -249,7 +301,7 @@ def _next_queue(
             "take a larger bound, a smaller image or a camera further away"
         )
     target, target_path = _empty_queue(length)
-    _subdivide(queue, path, places, target, target_path)
+    for_parts(_subdivide, parts_of(len(path), BLOCK), queue, path, places, target, target_path)
     return target, target_path
 
 

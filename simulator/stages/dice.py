@@ -1,8 +1,8 @@
 """Dice: every sub-patch becomes a 4x4 grid of shaded vertices (Eisenacher & Loop 2010, section 3).
 
 "Then we evaluate a 4x4 grid for each sub-patch and shade the vertices. Position and color are written to a VBO." Like
-the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch. The kernel here evaluates a grid as a
-tensor product instead, rows first, which changes no count.
+the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch. The kernel here evaluates grids as
+tensor products instead, rows first, a batch of them side by side, which changes no count.
 
 A vertex is 16 bytes: x, y in pixels from the top left corner, depth z/w, and the colour as RGBA8 in the bits of the
 fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs.
@@ -12,21 +12,33 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from models.coalescing import transactions
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
-from simulator.stages.bezier import basis, evaluate, restrict, screen_points
+from simulator.parallel import for_parts, parts_of
+from simulator.stages import shading
+from simulator.stages.bezier import (
+    LANES,
+    basis,
+    evaluate,
+    gather,
+    new_squares,
+    restrict,
+    screen_points,
+    set_parameter,
+    set_square,
+)
 from simulator.stages.bound_and_split import SubPatches
-from simulator.stages.shading import MATT, NORMAL, NUDGE, lighting, new_grid, set_normals, shade
+from simulator.stages.shading import MATT, NORMAL, NUDGE, lighting, new_grid, packed_color, set_normals, shade
 from simulator.work import Work
 
 BLOCK = 256  # threads, a vertex each: 16 sub-patches
 VERTICES = 16  # of a grid
-CHUNK = 256  # sub-patches that one call of the worker takes
+GRID_SIDE = 4  # vertices
 VERTEX_BYTES = 16
 POINT_BYTES = 16  # a homogeneous control point
 ENTRY_BYTES = 8  # of the patch queue
@@ -57,14 +69,8 @@ _E = DiceEvent
 
 
 @njit(cache=True, nogil=True)
-def _set_tables(grid: Any, first_u: Any, first_v: Any, side: Any) -> Any:
-    basis(first_u, side, grid.by_u, grid.slope_u)
-    basis(first_v, side, grid.by_v, grid.slope_v)
-
-
-@njit(cache=True, nogil=True)
 def _evaluate(grid: Any, net: Any) -> Any:
-    """Points, tangents and normals of a grid from the control net (D, 16) of its patch; vertices without a normal."""
+    """Points, tangents and normals of grids from the control nets (D, 16, LANES); vertices without a normal."""
     evaluate(
         net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
     )
@@ -72,50 +78,61 @@ def _evaluate(grid: Any, net: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
-def _borrow_normals(grid: Any, net: Any, first_u: Any, first_v: Any, side: Any, spare: Any) -> Any:
-    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
-    for k in range(VERTICES):
-        if grid.rows[MATT + k] > 0:
-            continue
-        middle = np.float32(0.5)
-        u = np.float32(3 * first_u + (k & 3)) * side / np.float32(3)
-        v = np.float32(3 * first_v + (k >> 2)) * side / np.float32(3)
-        _set_point_tables(spare, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE)
-        _evaluate(spare, net)
-        for d in range(3):
-            grid.rows[NORMAL + 16 * d + k] = spare.rows[NORMAL + 16 * d]
+def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any, spare: Any, one: Any) -> Any:
+    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch.
+
+    ``spare`` and ``one`` are a grid and a net of which only the first vertex in the first lane counts.
+    """
+    middle = np.float32(0.5)
+    for n in range(lanes):
+        for k in range(VERTICES):
+            at = k * LANES + n
+            if grid.rows[MATT + at] > 0:
+                continue
+            u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / np.float32(3)
+            v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / np.float32(3)
+            set_parameter(spare.by_u, spare.slope_u, 0, 0, u + (middle - u) * NUDGE)
+            set_parameter(spare.by_v, spare.slope_v, 0, 0, v + (middle - v) * NUDGE)
+            for d in range(net.shape[0]):
+                for point in range(VERTICES):
+                    one[d, point, 0] = net[d, point, n]
+            _evaluate(spare, one)
+            for row in range(NORMAL, NORMAL + 3 * shading.VERTICES, shading.VERTICES):
+                grid.rows[row + at] = spare.rows[row]
 
 
 @njit(cache=True, nogil=True)
-def _set_point_tables(grid: Any, u: Any, v: Any) -> Any:
-    """Tables of a grid of which only the first vertex counts, at (u, v)."""
-    for table, slopes, a in ((grid.by_u, grid.slope_u, u), (grid.by_v, grid.slope_v, v)):
-        A = np.float32(1) - a
-        table[:] = np.float32(0)
-        slopes[:] = np.float32(0)
-        table[0, 0], table[1, 0] = A * A * A, np.float32(3) * a * A * A
-        table[2, 0], table[3, 0] = np.float32(3) * a * a * A, a * a * a
-        slopes[0, 0], slopes[1, 0], slopes[2, 0] = A * A, np.float32(2) * a * A, a * a
+def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, boxes: Any) -> Any:
+    """Write the vertices of each lane, and bound them."""
+    screen = grid.screen
+    for n in range(lanes):
+        x0 = y0 = np.float32(np.inf)
+        x1 = y1 = np.float32(-np.inf)
+        for k in range(VERTICES):
+            x, y = screen[0, k, n], screen[1, k, n]
+            vertices[first + n, k, 0], vertices[first + n, k, 1], vertices[first + n, k, 2] = x, y, screen[3, k, n]
+            colors[first + n, k, 3] = packed_color(grid.rows, k * LANES + n)
+            x0, x1 = min(x0, x), max(x1, x)
+            y0, y1 = min(y0, y), max(y1, y)
+        boxes[first + n, 0], boxes[first + n, 1], boxes[first + n, 2], boxes[first + n, 3] = x0, y0, x1, y1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project(s: Any) -> Any:
+    """Divide the screen rows of all vertices by w."""
+    for k in range(shading.VERTICES):
+        scale = np.float32(1) / s[2 * shading.VERTICES + k]
+        s[k] *= scale
+        s[shading.VERTICES + k] *= scale
+        s[3 * shading.VERTICES + k] *= scale
 
 
 @njit(cache=True, nogil=True)
-def _store_grid(screen: Any, vertices: Any, box: Any) -> Any:
-    """Project 16 vertices, and bound them."""
-    x0 = y0 = np.float32(np.inf)
-    x1 = y1 = np.float32(-np.inf)
-    for k in range(VERTICES):
-        scale = np.float32(1) / screen[2, k]
-        x, y = screen[0, k] * scale, screen[1, k] * scale
-        vertices[k, 0], vertices[k, 1], vertices[k, 2] = x, y, screen[3, k] * scale
-        x0, x1 = min(x0, x), max(x1, x)
-        y0, y1 = min(y0, y), max(y1, y)
-    box[0], box[1], box[2], box[3] = x0, y0, x1, y1
-
-
-@njit(cache=True, nogil=True)
-def _dice_chunk(
-    start: Any,
-    stop: Any,
+def _dice(
+    part: Any,
+    parts: Any,
+    side: Any,
+    width: Any,
     subpatches: Any,
     nets: Any,
     screen: Any,
@@ -125,27 +142,26 @@ def _dice_chunk(
     colors: Any,
     boxes: Any,
 ) -> Any:
-    """Dice the sub-patches start..stop-1."""
-    grid = new_grid()
-    spare = new_grid()
-    for n in range(start, stop):
-        patch, i, j = subpatches.patch[n], np.int64(subpatches.i[n]), np.int64(subpatches.j[n])
-        side = np.float32(1) / np.float32(1 << subpatches.level[n])
-        _set_tables(grid, i, j, side)
-        restrict(screen[patch], grid.by_u, grid.by_v, grid.between, grid.screen)
-        _store_grid(grid.screen, vertices[n], boxes[n])
-        if _evaluate(grid, nets[patch]):
-            _borrow_normals(grid, nets[patch], i, j, side, spare)
-        shade(grid, light, texture, i, j, side, colors[n])
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _dice(
-    subpatches: Any, nets: Any, screen: Any, light: Any, texture: Any, vertices: Any, colors: Any, boxes: Any
-) -> Any:
-    for chunk in prange(-(-boxes.shape[0] // CHUNK)):
-        stop = min((chunk + 1) * CHUNK, boxes.shape[0])
-        _dice_chunk(chunk * CHUNK, stop, subpatches, nets, screen, light, texture, vertices, colors, boxes)
+    """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
+    grid, spare, squares = new_grid(side, width), new_grid(side, width), new_squares(width)
+    corners, net = np.empty((4, VERTICES, width), np.float32), np.empty((nets.shape[1], VERTICES, width), np.float32)
+    one = np.zeros((nets.shape[1], VERTICES, width), np.float32)
+    number = boxes.shape[0]
+    batches = (number + LANES - 1) // LANES
+    for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):
+        lanes = min(LANES, number - first)
+        for n in range(width):
+            set_square(squares, n, subpatches, first + min(n, lanes - 1))
+        basis(squares.i, squares.side, grid.by_u, grid.slope_u)
+        basis(squares.j, squares.side, grid.by_v, grid.slope_v)
+        gather(screen, squares.patch, corners)
+        restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
+        _project(grid.rows)
+        gather(nets, squares.patch, net)
+        if _evaluate(grid, net):
+            _borrow_normals(grid, net, squares, lanes, spare, one)
+        shade(grid, light, texture, squares)
+        _store_grids(grid, first, lanes, vertices, colors, boxes)
 
 
 def dice(
@@ -198,7 +214,21 @@ def dice(
     vertices = np.empty((number, VERTICES, 4), np.float32)
     grids = Grids(vertices, np.empty((number, 4), np.float32))
     light = lighting(points, matrix)
-    _dice(subpatches, nets, screen, light, texture, vertices, vertices.view(np.uint32), grids.boxes)
+    colors = vertices.view(np.uint32)
+    for_parts(
+        _dice,
+        parts_of(number, BLOCK),
+        GRID_SIDE,
+        LANES,
+        subpatches,
+        nets,
+        screen,
+        light,
+        texture,
+        vertices,
+        colors,
+        grids.boxes,
+    )
     return grids, [_dice_work(number, len(points), texture is not None, simt)] if counting else []
 
 

@@ -1,4 +1,4 @@
-"""Phong shading of one diced grid: ambient, diffuse and specular light of one lamp, on a texture or a checker.
+"""Phong shading of diced grids: ambient, diffuse and specular light of one lamp, on a texture or a checker.
 
 The lamp hangs above the viewer's left shoulder and is infinitely far away; surfaces are two-sided. The paper says
 "Phong shaded" and "textured" and no more: reflectances and lamp are ours.
@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from simulator.stages.bezier import LANES
 
 AMBIENT = np.float32(0.15)
 DIFFUSE = np.float32(0.75)
@@ -32,44 +34,45 @@ class Lighting(NamedTuple):
     squares: np.float32  # checker squares in a unit of length
 
 
-# Rows of 16 vertices in one buffer: with one base and constant distances LLVM sees that they do not overlap.
-SCREEN, POINT, ALONG_U, ALONG_V, NORMAL = 0, 64, 128, 192, 256  # 4 coordinates each, but 3 of NORMAL
-MATT, GLOSS = 304, 320  # ambient and diffuse, and specular light
-COLOR = 336  # red, green, blue
-ROWS = 384
+# Rows of 16 vertices of all lanes in one buffer: by one base and constant distances LLVM sees that they do not overlap.
+VERTICES = 16 * LANES  # vertex k of lane n is k * LANES + n
+SCREEN, POINT, ALONG_U, ALONG_V, NORMAL = (4 * VERTICES * row for row in range(5))  # 4 coordinates each, 3 of NORMAL
+MATT, GLOSS = 19 * VERTICES, 20 * VERTICES  # ambient and diffuse, and specular light
+COLOR = 21 * VERTICES  # red, green, blue
+ROWS = 24 * VERTICES
 
 
 class Grid(NamedTuple):
-    """Scratch of one grid: tables of its parameters, and rows of its vertices with views of some."""
+    """Scratch of the grids of all lanes: tables of their parameters, and rows of their vertices with views of some."""
 
-    by_u: NDArray[np.float32]  # (4, 4)
+    by_u: NDArray[np.float32]  # (4, 4, LANES)
     by_v: NDArray[np.float32]
-    slope_u: NDArray[np.float32]  # (3, 4)
+    slope_u: NDArray[np.float32]  # (3, 4, LANES)
     slope_v: NDArray[np.float32]
-    between: NDArray[np.float32]  # (16,)
+    between: NDArray[np.float32]  # (4, 4, LANES)
     rows: NDArray[np.float32]  # (ROWS,)
-    screen: NDArray[np.float32]  # (4, 16) x w, y w, w, z w
-    point: NDArray[np.float32]  # (4, 16) homogeneous, model space
-    along_u: NDArray[np.float32]  # (4, 16)
-    along_v: NDArray[np.float32]  # (4, 16)
+    screen: NDArray[np.float32]  # (4, 16, LANES) x w, y w, w, z w
+    point: NDArray[np.float32]  # (4, 16, LANES) homogeneous, model space
+    along_u: NDArray[np.float32]  # (4, 16, LANES)
+    along_v: NDArray[np.float32]  # (4, 16, LANES)
 
 
 @njit(cache=True, nogil=True)
-def new_grid() -> Any:
+def new_grid(side: Any, lanes: Any) -> Any:
     """Scratch for grids; w = 1 until a patch with weights writes it."""
     rows = np.zeros(ROWS, np.float32)
-    rows[POINT + 48 : POINT + 64] = 1
+    rows[POINT + 3 * VERTICES : POINT + 4 * VERTICES] = 1
     return Grid(
-        np.empty((4, 4), np.float32),
-        np.empty((4, 4), np.float32),
-        np.empty((3, 4), np.float32),
-        np.empty((3, 4), np.float32),
-        np.empty(16, np.float32),
+        np.zeros((4, side, lanes), np.float32),
+        np.zeros((4, side, lanes), np.float32),
+        np.zeros((3, side, lanes), np.float32),
+        np.zeros((3, side, lanes), np.float32),
+        np.zeros((side, side, lanes), np.float32),
         rows,
-        rows[SCREEN : SCREEN + 64].reshape(4, 16),
-        rows[POINT : POINT + 64].reshape(4, 16),
-        rows[ALONG_U : ALONG_U + 64].reshape(4, 16),
-        rows[ALONG_V : ALONG_V + 64].reshape(4, 16),
+        rows[SCREEN : SCREEN + 4 * VERTICES].reshape(4, 16, lanes),
+        rows[POINT : POINT + 4 * VERTICES].reshape(4, 16, lanes),
+        rows[ALONG_U : ALONG_U + 4 * VERTICES].reshape(4, 16, lanes),
+        rows[ALONG_V : ALONG_V + 4 * VERTICES].reshape(4, 16, lanes),
     )
 
 
@@ -100,32 +103,44 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def set_normals(s: Any) -> Any:
     """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
     missing = 0
-    for k in range(16):
-        px, py, pz, w = s[POINT + k], s[POINT + 16 + k], s[POINT + 32 + k], s[POINT + 48 + k]
-        wu, wv = s[ALONG_U + 48 + k], s[ALONG_V + 48 + k]
-        ux, uy, uz = s[ALONG_U + k] * w - px * wu, s[ALONG_U + 16 + k] * w - py * wu, s[ALONG_U + 32 + k] * w - pz * wu
-        vx, vy, vz = s[ALONG_V + k] * w - px * wv, s[ALONG_V + 16 + k] * w - py * wv, s[ALONG_V + 32 + k] * w - pz * wv
+    for k in range(VERTICES):
+        px, py, pz, w = s[POINT + k], s[POINT + VERTICES + k], s[POINT + 2 * VERTICES + k], s[POINT + 3 * VERTICES + k]
+        wu, wv = s[ALONG_U + 3 * VERTICES + k], s[ALONG_V + 3 * VERTICES + k]
+        ux, uy, uz = (
+            s[ALONG_U + k] * w - px * wu,
+            s[ALONG_U + VERTICES + k] * w - py * wu,
+            s[ALONG_U + 2 * VERTICES + k] * w - pz * wu,
+        )
+        vx, vy, vz = (
+            s[ALONG_V + k] * w - px * wv,
+            s[ALONG_V + VERTICES + k] * w - py * wv,
+            s[ALONG_V + 2 * VERTICES + k] * w - pz * wv,
+        )
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         most = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
         none = nx * nx + ny * ny + nz * nz <= DEGENERATE * most
         missing += none
-        s[NORMAL + k], s[NORMAL + 16 + k], s[NORMAL + 32 + k] = nx, ny, nz
+        s[NORMAL + k], s[NORMAL + VERTICES + k], s[NORMAL + 2 * VERTICES + k] = nx, ny, nz
         s[MATT + k] = _ZERO if none else _ONE  # until the light is set: whether there is a normal
     return missing
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> Any:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
-    for k in range(16):
-        w = s[POINT + 48 + k]
-        vx, vy, vz = ex * w - ew * s[POINT + k], ey * w - ew * s[POINT + 16 + k], ez * w - ew * s[POINT + 32 + k]
-        nx, ny, nz = s[NORMAL + k], s[NORMAL + 16 + k], s[NORMAL + 32 + k]
+    for k in range(VERTICES):
+        w = s[POINT + 3 * VERTICES + k]
+        vx, vy, vz = (
+            ex * w - ew * s[POINT + k],
+            ey * w - ew * s[POINT + VERTICES + k],
+            ez * w - ew * s[POINT + 2 * VERTICES + k],
+        )
+        nx, ny, nz = s[NORMAL + k], s[NORMAL + VERTICES + k], s[NORMAL + 2 * VERTICES + k]
         v_scale = _ONE / np.sqrt(vx * vx + vy * vy + vz * vz + tiny)
         n_scale = _ONE / np.sqrt(nx * nx + ny * ny + nz * nz + tiny)
         facing = (nx * vx + ny * vy + nz * vz) * (v_scale * n_scale)
@@ -143,49 +158,55 @@ def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew:
         s[GLOSS + k] = SPECULAR * mirrored
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _set_checker(s: Any, squares: Any) -> Any:
     """Reflectances of a solid checker."""
-    for k in range(16):
-        scale = squares / s[POINT + 48 + k]
-        cells = np.floor(s[POINT + k] * scale) + np.floor(s[POINT + 16 + k] * scale)
-        half = _HALF * (cells + np.floor(s[POINT + 32 + k] * scale))
+    for k in range(VERTICES):
+        scale = squares / s[POINT + 3 * VERTICES + k]
+        cells = np.floor(s[POINT + k] * scale) + np.floor(s[POINT + VERTICES + k] * scale)
+        half = _HALF * (cells + np.floor(s[POINT + 2 * VERTICES + k] * scale))
         odd = half != np.floor(half)
         s[COLOR + k] = LIGHT_SQUARE[0] if odd else DARK_SQUARE[0]
-        s[COLOR + 16 + k] = LIGHT_SQUARE[1] if odd else DARK_SQUARE[1]
-        s[COLOR + 32 + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
+        s[COLOR + VERTICES + k] = LIGHT_SQUARE[1] if odd else DARK_SQUARE[1]
+        s[COLOR + 2 * VERTICES + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
 
 
-@njit(cache=True, nogil=True)
-def _set_texels(s: Any, texture: Any, first_u: Any, first_v: Any, side: Any) -> Any:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _set_texels(s: Any, texture: Any, squares: Any) -> Any:
     """Reflectances from the texels at (u, v) of the patch, v down the rows."""
-    for k in range(16):
-        u = np.float32(3 * first_u + (k & 3)) * side / _THREE
-        v = np.float32(3 * first_v + (k >> 2)) * side / _THREE
+    for at in range(VERTICES):
+        n, k = at % LANES, at // LANES
+        u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / _THREE
+        v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / _THREE
         row = min(np.int64(v * np.float32(texture.shape[0])), texture.shape[0] - 1)
         column = min(np.int64(u * np.float32(texture.shape[1])), texture.shape[1] - 1)
         for channel in range(3):
-            s[COLOR + 16 * channel + k] = np.float32(texture[row, column, channel]) / _BYTE
+            s[COLOR + VERTICES * channel + at] = np.float32(texture[row, column, channel]) / _BYTE
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _set_colors(s: Any) -> Any:
     """Light the reflectances: levels from 0 to 255."""
-    for k in range(48):
-        level = s[COLOR + k] * s[MATT + (k & 15)] + s[GLOSS + (k & 15)]
-        s[COLOR + k] = min(level, _ONE) * _BYTE + _HALF
+    for channel in range(3):
+        for k in range(VERTICES):
+            level = s[COLOR + channel * VERTICES + k] * s[MATT + k] + s[GLOSS + k]
+            s[COLOR + channel * VERTICES + k] = min(level, _ONE) * _BYTE + _HALF
 
 
 @njit(cache=True, nogil=True)
-def shade(grid: Any, light: Any, texture: Any, first_u: Any, first_v: Any, side: Any, vertices: Any) -> Any:
-    """Write the colours of a grid with normals, RGBA8 with red lowest, to the fourth word of ``vertices`` (16, 4)."""
+def shade(grid: Any, light: Any, texture: Any, squares: Any) -> Any:
+    """Set the colours of grids with normals: three rows of levels, to be cut to whole numbers."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
     _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])
     if texture is None:
         _set_checker(s, light.squares)
     else:
-        _set_texels(s, texture, first_u, first_v, side)
+        _set_texels(s, texture, squares)
     _set_colors(s)
-    for k in range(16):
-        red, green, blue = np.uint32(s[COLOR + k]), np.uint32(s[COLOR + 16 + k]), np.uint32(s[COLOR + 32 + k])
-        vertices[k, 3] = red | green << np.uint32(8) | blue << np.uint32(16) | OPAQUE
+
+
+@njit(cache=True, nogil=True)
+def packed_color(s: Any, k: Any) -> Any:
+    """RGBA8 of a shaded vertex, red lowest."""
+    red, green, blue = s[COLOR + k], s[COLOR + VERTICES + k], s[COLOR + 2 * VERTICES + k]
+    return np.uint32(red) | np.uint32(green) << np.uint32(8) | np.uint32(blue) << np.uint32(16) | OPAQUE

@@ -9,12 +9,13 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.coalescing import contiguous, transactions
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.work import Work
 
 STAGE = "bound_and_split"
@@ -143,22 +144,19 @@ def _count_subdivide_warp(
 
 
 @njit(cache=True, nogil=True)
-def _count_block(block: Any, patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any) -> Any:
-    """Events of one block; of the subdivision where ``places`` are given."""
+def _count_blocks(
+    part: Any, parts: Any, patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any
+) -> Any:
+    """Events of the blocks of one part; of the subdivision where ``places`` are given."""
     addresses = np.empty(warp, np.int64)
-    end = min((block + 1) * BLOCK, path.shape[0])
-    for first in range(block * BLOCK, end, warp):
-        lanes = min(warp, end - first)
-        if places is None:
-            _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, table[block])
-        else:
-            _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, table[block])
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _count_blocks(patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any) -> Any:
-    for block in prange(table.shape[0]):
-        _count_block(block, patch, path, places, warp, coalescing, table)
+    for block in range(part * table.shape[0] // parts, (part + 1) * table.shape[0] // parts):
+        end = min((block + 1) * BLOCK, path.shape[0])
+        for first in range(block * BLOCK, end, warp):
+            lanes = min(warp, end - first)
+            if places is None:
+                _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, table[block])
+            else:
+                _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, table[block])
 
 
 def _blocks(threads: int) -> int:
@@ -199,7 +197,7 @@ def oracle_work(patch: NDArray[np.int32], path: NDArray[np.uint8], simt: Simt) -
     simt : Simt
     """
     table = np.zeros((_blocks(len(path)), len(_O)), np.int64)
-    _count_blocks(patch, path, None, simt.warp, simt.coalescing, table)
+    for_parts(_count_blocks, parts_of(len(table)), patch, path, None, simt.warp, simt.coalescing, table)
     total = table.sum(axis=0)
     entries = len(path) * ENTRY_BYTES
     distinct = 1 + int(np.count_nonzero(np.diff(patch))) if len(patch) else 0
@@ -236,7 +234,7 @@ def subdivide_work(path: NDArray[np.uint8], places: NDArray[np.uint32], simt: Si
     simt : Simt
     """
     table = np.zeros((_blocks(len(path)), len(_S)), np.int64)
-    _count_blocks(path, path, places, simt.warp, simt.coalescing, table)
+    for_parts(_count_blocks, parts_of(len(table)), path, path, places, simt.warp, simt.coalescing, table)
     total = table.sum(axis=0)
     loads = len(path) * (ENTRY_BYTES + 2 * WORD_BYTES)
     written = int(total[_S.KEEP_LANES] + 4 * total[_S.SPLIT_LANES]) * ENTRY_BYTES
