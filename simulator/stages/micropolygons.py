@@ -51,7 +51,7 @@ def micropolygons(
 def from_patches(
     patches: Patches, matrix: ArrayLike, width: int, height: int, size: float = 1.0, triangles: bool = False
 ) -> Micropolygons:
-    """Dice each patch evenly, at the power of two at which its control net's edges come under ``size`` pixels.
+    """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels.
 
     Raises
     ------
@@ -135,12 +135,12 @@ def _shades(polygons: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:
-    """Micropolygons along a patch's side: its longest control polygon in pixels over ``size``, a power of two."""
+    """Micropolygons along a patch's side: its longest control polygon in pixels over ``size``, rounded up."""
     grid = nets.reshape(-1, 4, 4, 3)[..., :2]
     rows = np.linalg.norm(np.diff(grid, axis=2), axis=-1).sum(axis=2).max(axis=1)
     columns = np.linalg.norm(np.diff(grid, axis=1), axis=-1).sum(axis=1).max(axis=1)
     wanted = np.clip(np.maximum(rows, columns) / size, 1.0, MOST_RATE)
-    rates: NDArray[np.int64] = 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+    rates: NDArray[np.int64] = np.ceil(wanted).astype(np.int64)
     return rates
 
 
