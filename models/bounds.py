@@ -13,7 +13,8 @@ start     blocks / block launch rate
 launch    overhead of the kernel
 ========  ===========================================================================================================
 
-time = launch + the largest of the others. It supposes that the units are many and alike; ``models.schedule`` does not.
+time = launch + the largest of the others; the servers of the whole chip (dram, l2, atomic, queue) stand idle until the
+first requests reach them and end before the last answer is back, so a unit's chain comes on top of theirs. It supposes that the units are many and alike; ``models.schedule`` does not.
 """
 
 import numpy as np
@@ -24,6 +25,8 @@ from models.machine import Machine
 from models.occupancy import Residency, residency
 from models.timing import Timing
 from models.traffic import Traffic
+
+SERVERS = ("dram", "l2", "atomic", "queue")  # of the whole chip
 
 
 def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
@@ -42,9 +45,10 @@ def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
         A block that the machine cannot launch.
     """
     held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    terms = bound_terms(launch, machine, demand(launch, machine, moved), held)
+    asked = demand(launch, machine, moved)
+    terms = bound_terms(launch, machine, asked, held)
     bound = max(terms, key=lambda name: terms[name])
-    cycles = terms["launch"] + max(value for name, value in terms.items() if name != "launch")
+    cycles = terms["launch"] + longest(terms, asked)
     return timing(launch, machine, moved, held, terms, cycles, bound)
 
 
@@ -68,6 +72,12 @@ def bound_terms(launch: Launch, machine: Machine, asked: Demand, held: Residency
         "start": blocks / machine.launch.blocks_per_us * machine.sm.clock_mhz,
         "launch": machine.launch.kernel_us * machine.sm.clock_mhz,
     }
+
+
+def longest(terms: dict[str, float], asked: Demand) -> float:
+    """Cycles of the term that takes longest, the way to the chip's servers and back included."""
+    way = float(asked.chain.min()) if len(asked.chain) else 0.0
+    return max(value + (way if name in SERVERS and value else 0.0) for name, value in terms.items() if name != "launch")
 
 
 def slots(launch: Launch, machine: Machine, held: Residency) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -77,7 +77,7 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     share = _shares(bytes_moved)
     chain = _chain(launch, machine, moved)
     queue = _shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine)
-    l2_cycles = moved.l2_bytes / memory.l2_bytes_per_clock if memory.l2_bytes else 0.0
+    l2_cycles = _l2_cycles(moved, machine)
     warps = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
     spread = machine.sm.schedulers / min(machine.sm.schedulers, warps)
     return Demand(
@@ -91,6 +91,15 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
         chain=chain,
         alone=np.maximum(chain, issue * spread),
     )
+
+
+def _l2_cycles(moved: Traffic, machine: Machine) -> float:
+    """L2 cycles of all bytes: stores may be slower than loads."""
+    memory = machine.memory
+    if not memory.l2_bytes:
+        return 0.0
+    stores = moved.written_bytes / (memory.l2_write_bytes_per_clock or memory.l2_bytes_per_clock)
+    return (moved.l2_bytes - moved.written_bytes) / memory.l2_bytes_per_clock + stores
 
 
 def _dispatch(events: Cycles, machine: Machine) -> Cycles:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+import msgspec.structs
 
 from models.errors import TilestampError
 from models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
@@ -148,7 +149,8 @@ def _build(table: dict[str, Any], file: str) -> Machine:
     for name, struct in SECTIONS.items():
         if name not in table:
             continue
-        _check_keys(table[name], list(struct.__struct_fields__), set(), f"key of [{name}]", file)
+        optional = {field.name for field in msgspec.structs.fields(struct) if not field.required}
+        _check_keys(table[name], list(struct.__struct_fields__), optional, f"key of [{name}]", file)
         sections[name] = table[name] if name == "identity" else _plain(table[name], name, origins, file)
     return _convert(sections, origins, file)
 

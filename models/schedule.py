@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.bounds import bound_terms, slots, timing
+from models.bounds import bound_terms, longest, slots, timing
 from models.demand import Demand, demand
 from models.launch import Launch
 from models.machine import Machine
@@ -66,8 +66,7 @@ def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
     if launch.dispatch != "blocks" and len(alone):  # persistent blocks start once
         end += machine.latency.block_launch_cycles
         last_start += machine.latency.block_launch_cycles
-    work = {name: value for name, value in terms.items() if name != "launch"}
-    played = max(end, *work.values())
+    played = max(end, longest(terms, asked))
     return timing(
         launch,
         machine,

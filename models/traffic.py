@@ -31,11 +31,14 @@ class Traffic:
     dram_bytes, l2_bytes : float
     load_miss : float
         Share of the bytes loaded that came from DRAM: it sets the latency of a load.
+    written_bytes : float
+        Of ``l2_bytes``: stores.
     """
 
     dram_bytes: float
     l2_bytes: float
     load_miss: float
+    written_bytes: float = 0.0
 
 
 @dataclass
@@ -85,7 +88,8 @@ def _launch_traffic(streams: tuple[Stream, ...], cache: _Cache) -> Traffic:
         if stream.op == "load":
             loaded += stream.bytes
             missed += fetched + reuse
-    return Traffic(dram, moved, missed / loaded if loaded else 0.0)
+    written = float(sum(stream.bytes for stream in streams if stream.op == "store"))
+    return Traffic(dram, moved, missed / loaded if loaded else 0.0, written)
 
 
 def _footprints(streams: tuple[Stream, ...]) -> dict[str, int]:

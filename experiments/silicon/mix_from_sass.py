@@ -95,8 +95,9 @@ def patch_prices(code: list[Instruction], event: str, chains: Price) -> dict[str
             break
     patch = counted(rest) | chain(rest, 1 / 8) | {name: float(count) / 8 for name, count in chains.items()}
     share = 1 / len(bodies) if event == "ATOMIC" else 1 / 9 if event == "WRITE_WARPS" else 1.0
-    lanes: Price = {} if event == "LAST_WRITE_WARPS" else {"lanes": "SLOT_LANES" if event == "ATOMIC" else "WRITE_LANES"}
-    return {"PATCH_WARPS": patch | {"lanes": "PATCH_LANES"}, event: counted(bodies, share) | lanes}
+    slot = counted(bodies, share) | {"lanes": "SLOT_LANES" if event == "ATOMIC" else event.replace("WARPS", "LANES")}
+    slot.pop("atomic", None)  # the event ATOMIC passes through
+    return {"PATCH_WARPS": patch | {"lanes": "PATCH_LANES"}, event: slot}
 
 
 def table(name: str, registers: int, prices: dict[str, Price]) -> str:

@@ -34,10 +34,10 @@ LATENCY = {  # cycles until a scoreboard is released
     "MUFU": 17.0,  # measured: latency MUFU.RSQ
     "F2I": 17.0,  # measured: latency F2I
     "I2F": 17.0,  # as F2I: the same unit
-    "S2UR": 25.0,  # fitted, see mix_from_sass
-    "S2R": 25.0,  # as S2UR
+    "S2UR": 35.0,  # fitted, see mix_from_sass
+    "S2R": 35.0,  # as S2UR
 }
-BRANCH = 10.0  # cycles, fitted: further cycles of a branch before the next instruction of the warp issues
+BRANCH = 13.0  # cycles, fitted: further cycles of a branch before the next instruction of the warp issues
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,13 @@ One thread a patch again: for each tile that the patch overlaps, ``LISTS[START[t
 from enum import IntEnum
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.coalescing import transactions
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.bucket_count import BLOCK, WORD_BYTES, active_lanes, patch_traffic
 from simulator.stages.tile_range import Tiles, slot_tiles, tile_range
 from simulator.work import Work
@@ -33,6 +34,7 @@ class BucketWriteEvent(IntEnum):
     BOX_BYTES = 10  # of LOAD_BYTES: boxes
     IDX_BYTES = 11  # of LOAD_BYTES: IDX
     LAST_WRITE_WARPS = 12  # of WRITE_WARPS: the last slot, which compilers branch around and do not predicate
+    LAST_WRITE_LANES = 13
 
 
 _E = BucketWriteEvent
@@ -57,7 +59,9 @@ def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row
         return
     row[_E.DIVERGENT_WARPS] += active < lanes
     row[_E.WRITE_WARPS] += 1
-    row[_E.LAST_WRITE_WARPS] += slot == idx.shape[1] - 1
+    if slot == idx.shape[1] - 1:
+        row[_E.LAST_WRITE_WARPS] += 1
+        row[_E.LAST_WRITE_LANES] += active
     row[_E.WRITE_LANES] += active
     for lane in range(lanes):
         addresses[lane] = max(tile[lane] * WORD_BYTES, -1)
@@ -73,13 +77,13 @@ def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row
 
 
 @njit(cache=True, nogil=True)
-def _count_blocks(first_block, stop, boxes, tiles, warp, start, idx, coalescing, table):
-    """Events of the blocks first_block..stop-1."""
-    patches = boxes.shape[0]
+def _count_blocks(part, parts, boxes, tiles, warp, start, idx, coalescing, table):
+    """Events of the blocks of one part."""
+    patches, blocks = boxes.shape[0], table.shape[0]
     slots = np.empty((tiles.slots**2, warp), np.int64)
     addresses = np.empty(warp, np.int64)
     traffic = patch_traffic(0, warp, patches, tiles.slots, coalescing, addresses)
-    for block in range(first_block, stop):
+    for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         row = table[block]
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), warp):
             lanes = min(warp, patches - first)
@@ -94,15 +98,6 @@ def _count_blocks(first_block, stop, boxes, tiles, warp, start, idx, coalescing,
             slot_tiles(boxes, first, lanes, tiles, slots)
             for slot in range(tiles.slots**2):
                 _count_slot(slots[slot], first, lanes, slot, start, idx, coalescing, addresses, row)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _count_writes(parts, boxes, tiles, warp, start, idx, coalescing, table):
-    """All blocks, in parts."""
-    blocks = table.shape[0]
-    for part in prange(parts):
-        first, stop = part * blocks // parts, (part + 1) * blocks // parts
-        _count_blocks(first, stop, boxes, tiles, warp, start, idx, coalescing, table)
 
 
 def bucket_write(
@@ -142,7 +137,8 @@ def bucket_write(
     if not counting:
         return lists, []
     table = np.zeros((-(-len(boxes) // BLOCK), len(_E)), np.int64)
-    _count_writes(get_num_threads(), boxes, tiles, simt.warp, start, idx, simt.coalescing, table)
+    parts = parts_of(len(table))
+    for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
     total = table.sum(axis=0)
     own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])
     streams = (
@@ -151,4 +147,6 @@ def bucket_write(
         Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
         Stream("LISTS", "store", int(total[_E.STORE_BYTES]), lists.nbytes),
     )
-    return lists, [Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)]
+    return lists, [
+        Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)
+    ]
