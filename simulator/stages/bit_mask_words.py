@@ -35,7 +35,7 @@ def new_mask(box, spp, layers, with_depth):
 def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
     """Read words until one has a sample to test, or the lane's box ends; returns words read, depths looked up.
 
-    In sequence, what the patch has at equal depth is an earlier polygon, and wins; in flight together it may be a later.
+    In sequence, what the patch has at equal depth is an earlier polygon and wins; in flight it may be a later.
 
     A lane's walk is x0, y0, x1, y1 in pixels, row, word, pending bits, mask layer; word is -1 at the start of a row.
     """
@@ -66,5 +66,5 @@ def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
 
 @njit(cache=True, nogil=True)
 def _front(depths):
-    """Nearest vertex of a polygon: no depth in it is less, not even by rounding; a triangle repeats vertex 0 in row 1."""
+    """Nearest vertex of a polygon: no depth in it is less, even rounded; a triangle repeats vertex 0 in row 1."""
     return np.float32(min(depths[0, 0], depths[0, 1], depths[0, 2], depths[1, 2]))
