@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 
 from models.errors import TilestampError
+from models.price import Fidelity
 from simulator.run import Run
 from simulator.scenes.camera import Camera, LookAt, fit_camera
 from simulator.scenes.library import load_scene
 from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import Fidelity, simulate
+from simulator.simulation import simulate
 
 MACHINE = "gt750m"
 SIZE = 800  # pixels

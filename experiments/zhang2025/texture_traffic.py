@@ -36,7 +36,7 @@ def wall(minification: float, degrees: int) -> Scene:
 def shader(scene: Scene, simt: Simt, layout: str, texture_filter: str) -> Work:
     """Draw the wall and give the pixel shader's work."""
     frame = binned(scene, np.eye(4), SIZE, SIZE, simt, texture_layout=layout, texture_filter=texture_filter)  # type: ignore[arg-type]
-    return next(work for work in frame.works if work.stage == "PixelShader")
+    return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
 
 
 def run(progress: Callable[[str], None]) -> Result:
