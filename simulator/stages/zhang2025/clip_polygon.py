@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 PLANES = 6
-MOST_VERTICES = 9  # a triangle gains at most one for each plane
+MOST_VERTICES = 12  # 9, since a triangle gains one for each plane; rounding of slivers may find more crossings
 _ZERO = np.float32(0.0)
 
 
@@ -29,10 +29,12 @@ def outcode(vertex: Any) -> int:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def clip_polygon(polygon: Any, scratch: Any, count: int) -> int:
-    """Clip ``polygon``, (9, n), in place; returns its vertices, 0 where nothing is left."""
+    """Clip ``polygon``, (12, n), in place; returns its vertices, 0 where nothing is left."""
     for plane in range(PLANES):
         kept = 0
         for i in range(count):
+            if kept > len(scratch) - 2:
+                break
             j = i + 1 if i + 1 < count else 0
             here = distance(polygon[i], plane)
             there = distance(polygon[j], plane)
