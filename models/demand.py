@@ -5,7 +5,8 @@ A unit of work (a block, or an item drawn by a persistent block or warp) holds
 issue       the schedulers of its SM, by ``[issue]``: warp instructions x cycles / schedulers; or, if longer, one
             execution unit behind them, by ``[pipe]`` (they work side by side, so the fullest one counts)
 shared      the shared memory of its SM: passes x cycles, replays included
-l1          the load/store path of its SM: bytes of its transactions
+l1          the load/store path of its SM: bytes of its transactions, and the requests of atomics in L2 units, of which
+            an SM sends its share of what all SMs together were measured to send
 dram, l2    the chip's bandwidths: its share of the launch's bytes
 atomic      the chip's atomic units together: requests, and lanes that conflict
 queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there. Where atomics
@@ -83,7 +84,7 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     return Demand(
         issue=issue,
         shared=passes * memory.bank_pass_cycles,
-        l1=bytes_moved / memory.l1_bytes_per_clock,
+        l1=bytes_moved / memory.l1_bytes_per_clock + _sent(events, machine),
         dram=share * (moved.dram_bytes / machine.dram_bytes_per_cycle),
         l2=share * l2_cycles,
         atomic=_atomic(events, machine) + (queue if machine.atomics.place == "dram_lock" else 0.0),
@@ -135,9 +136,24 @@ def _chain(launch: Launch, machine: Machine, moved: Traffic) -> Cycles:
 
 def _atomic(events: Cycles, machine: Machine) -> Cycles:
     """Cycles of all atomic units together."""
+    conflict_cycles = machine.atomics.conflict_ns * machine.clock_hz * 1e-9
+    requests = events[:, E.ATOMIC_REQUESTS] / _request_rate(events, machine)
+    return requests + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
+
+
+def _sent(events: Cycles, machine: Machine) -> Cycles:
+    """Cycles in which the SM of a unit sends its atomic requests."""
+    if machine.atomics.place != "l2_unit":
+        return np.zeros(len(events))
+    sent: Cycles = events[:, E.ATOMIC_REQUESTS] * (machine.sm.count / _request_rate(events, machine))
+    return sent
+
+
+def _request_rate(events: Cycles, machine: Machine) -> float:
+    """Requests in a clock of all SMs together; more where nobody waits for the value returned."""
     atomics = machine.atomics
-    conflict_cycles = atomics.conflict_ns * machine.clock_hz * 1e-9
-    return events[:, E.ATOMIC_REQUESTS] / atomics.requests_per_clock + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
+    unawaited = atomics.unawaited_per_clock and not events[:, E.CHAIN_ATOMIC].any()
+    return atomics.unawaited_per_clock if unawaited else atomics.requests_per_clock
 
 
 def _fullest_queue(launch: Launch, machine: Machine) -> float:

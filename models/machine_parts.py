@@ -106,6 +106,7 @@ class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit_ns_per_request: Amount  # for which the unit is held
     requests_per_clock: Positive  # all units together, at different addresses
     conflict_ns: Amount  # further time of the whole memory system for a lane that an earlier lane of its warp blocks
+    unawaited_per_clock: Amount = 0.0  # as requests_per_clock, where no value is returned; 0: the same
 
 
 class Launching(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
