@@ -52,20 +52,18 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     """
     count = 0
     total = 0
+    request, segment = lanes, SECTOR_BYTES
     if rule == HALF_WARP_SEGMENTS:
-        segment = min(SEGMENT_BYTES, SECTOR_BYTES * access_bytes)
-        for first in range(0, lanes, HALF_WARP):
-            n, b = _segments(addresses, first, min(first + HALF_WARP, lanes), access_bytes, segment, True)
-            count += n
-            total += b
+        request, segment = HALF_WARP, min(SEGMENT_BYTES, SECTOR_BYTES * access_bytes)
     elif rule == WARP_LINES:
-        request = lanes if access_bytes <= WORD_BYTES else max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
-        for first in range(0, lanes, max(1, request)):
-            n, b = _segments(addresses, first, min(first + request, lanes), access_bytes, SEGMENT_BYTES, False)
-            count += n
-            total += b
-    else:
-        count, total = _segments(addresses, 0, lanes, access_bytes, SECTOR_BYTES, False)
+        segment = SEGMENT_BYTES
+        if access_bytes > WORD_BYTES:
+            request = max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
+    for first in range(0, lanes, max(1, request)):
+        end = min(first + request, lanes)
+        n, b = _segments(addresses, first, end, access_bytes, segment, rule == HALF_WARP_SEGMENTS)
+        count += n
+        total += b
     return count, total
 
 

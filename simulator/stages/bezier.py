@@ -104,31 +104,36 @@ def set_parameter(rows: Any, slopes: Any, k: Any, n: Any, a: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
+def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
+    return w[0, k, n] * p0 + w[1, k, n] * p1 + w[2, k, n] * p2 + w[3, k, n] * p3
+
+
+@njit(cache=True, nogil=True)
+def _weigh_steps(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
+    return w[0, k, n] * (p1 - p0) + w[1, k, n] * (p2 - p1) + w[2, k, n] * (p3 - p2)
+
+
+@njit(cache=True, nogil=True)
 def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
     """Contract the rows of coordinate d of a net: ``between[r, x]``."""
-    for r in range(between.shape[0]):
-        for x in range(between.shape[1]):
-            for n in range(between.shape[2]):
-                between[r, x, n] = (
-                    by_v[0, r, n] * net[d, x, n]
-                    + by_v[1, r, n] * net[d, x + 4, n]
-                    + by_v[2, r, n] * net[d, x + 8, n]
-                    + by_v[3, r, n] * net[d, x + 12, n]
-                )
+    for x in range(between.shape[1]):
+        for n in range(between.shape[2]):
+            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+            q0, q1 = _weigh(by_v, 0, n, p0, p1, p2, p3), _weigh(by_v, 1, n, p0, p1, p2, p3)
+            q2, q3 = _weigh(by_v, 2, n, p0, p1, p2, p3), _weigh(by_v, 3, n, p0, p1, p2, p3)
+            between[0, x, n], between[1, x, n], between[2, x, n], between[3, x, n] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
 def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
     """Contract the columns: ``out[d, 4 r + c]``."""
     for r in range(between.shape[0]):
-        for c in range(between.shape[1]):
-            for n in range(between.shape[2]):
-                out[d, 4 * r + c, n] = (
-                    by_u[0, c, n] * between[r, 0, n]
-                    + by_u[1, c, n] * between[r, 1, n]
-                    + by_u[2, c, n] * between[r, 2, n]
-                    + by_u[3, c, n] * between[r, 3, n]
-                )
+        for n in range(between.shape[2]):
+            p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
+            q0, q1 = _weigh(by_u, 0, n, p0, p1, p2, p3), _weigh(by_u, 1, n, p0, p1, p2, p3)
+            q2, q3 = _weigh(by_u, 2, n, p0, p1, p2, p3), _weigh(by_u, 3, n, p0, p1, p2, p3)
+            k = 4 * r
+            out[d, k, n], out[d, k + 1, n], out[d, k + 2, n], out[d, k + 3, n] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
@@ -153,24 +158,23 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
 def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
     """Contract the differences of neighbouring columns."""
     for r in range(between.shape[0]):
-        for c in range(between.shape[1]):
-            for n in range(between.shape[2]):
-                p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
-                out[d, 4 * r + c, n] = (
-                    slope_u[0, c, n] * (p1 - p0) + slope_u[1, c, n] * (p2 - p1) + slope_u[2, c, n] * (p3 - p2)
-                )
+        for n in range(between.shape[2]):
+            p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
+            q0, q1 = _weigh_steps(slope_u, 0, n, p0, p1, p2, p3), _weigh_steps(slope_u, 1, n, p0, p1, p2, p3)
+            q2, q3 = _weigh_steps(slope_u, 2, n, p0, p1, p2, p3), _weigh_steps(slope_u, 3, n, p0, p1, p2, p3)
+            k = 4 * r
+            out[d, k, n], out[d, k + 1, n], out[d, k + 2, n], out[d, k + 3, n] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
 def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
     """Contract the differences of neighbouring rows."""
-    for r in range(between.shape[0]):
-        for x in range(between.shape[1]):
-            for n in range(between.shape[2]):
-                p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
-                between[r, x, n] = (
-                    slope_v[0, r, n] * (p1 - p0) + slope_v[1, r, n] * (p2 - p1) + slope_v[2, r, n] * (p3 - p2)
-                )
+    for x in range(between.shape[1]):
+        for n in range(between.shape[2]):
+            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+            q0, q1 = _weigh_steps(slope_v, 0, n, p0, p1, p2, p3), _weigh_steps(slope_v, 1, n, p0, p1, p2, p3)
+            q2, q3 = _weigh_steps(slope_v, 2, n, p0, p1, p2, p3), _weigh_steps(slope_v, 3, n, p0, p1, p2, p3)
+            between[0, x, n], between[1, x, n], between[2, x, n], between[3, x, n] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)

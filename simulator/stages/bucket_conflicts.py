@@ -42,7 +42,7 @@ class Wanted(NamedTuple):
 def atomic_rule(simt: Simt, padding: int) -> AtomicRule:
     """Rule of a machine for counters that lie ``padding`` words apart."""
     half = simt.coalescing == Coalescing.HALF_WARP_SEGMENTS
-    return AtomicRule(simt.warp, min(HALF_WARP, simt.warp) if half else simt.warp, simt.atomic_merge, padding)
+    return AtomicRule(simt.warp, min(HALF_WARP, simt.warp) if half else simt.warp, int(simt.atomic_merge), padding)
 
 
 @njit(cache=True, nogil=True)

@@ -12,13 +12,14 @@ all lanes of a warp that want the same tile.
 from enum import IntEnum
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from models.atomics import CHUNK_BYTES
 from models.coalescing import contiguous, transactions
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts
 from simulator.stages.bucket_conflicts import atomic_rule, keep_leaders, list_wanted, scratch, send_requests
 from simulator.stages.tile_range import Tiles, slot_tiles
 from simulator.work import Work
@@ -136,13 +137,15 @@ def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
 
 
 @njit(cache=True, nogil=True)
-def _find_tiles(start, stop, boxes, tiles, rule, coalescing, aggregate, slots, table, chunk_requests):
-    """Tiles of all lanes and slots in the blocks start..stop-1, and their events."""
+def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests):
+    """Tiles of all lanes and slots in the blocks of one part, and their events; a row of ``requests`` a part."""
     patches = boxes.shape[0]
+    blocks = (patches + BLOCK - 1) // BLOCK
+    chunk_requests = requests[part]
     wanted = scratch(rule.warp)
     addresses = np.empty(rule.warp, np.int64)
     traffic = patch_traffic(0, rule.warp, patches, tiles.slots, coalescing, addresses)
-    for block in range(start, stop):
+    for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), rule.warp):
             lanes = min(rule.warp, patches - first)
             tile = slots[first // rule.warp]
@@ -159,16 +162,6 @@ def _find_tiles(start, stop, boxes, tiles, rule, coalescing, aggregate, slots, t
                 row[_E.STORE_BYTES] += traffic[3]
                 for slot in range(tiles.slots**2):
                     _count_atomic(tile[slot], lanes, rule, aggregate, wanted, row, chunk_requests, addresses)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _find_all_tiles(parts, boxes, tiles, rule, coalescing, aggregate, slots, table, chunk_requests):
-    """All blocks, in parts; a row of ``chunk_requests`` each."""
-    blocks = (boxes.shape[0] + BLOCK - 1) // BLOCK
-    for part in prange(parts):
-        start, stop = part * blocks // parts, (part + 1) * blocks // parts
-        requests = chunk_requests[part]
-        _find_tiles(start, stop, boxes, tiles, rule, coalescing, aggregate, slots, table, requests)
 
 
 def bucket_count(
@@ -210,13 +203,21 @@ def bucket_count(
     table = np.zeros((blocks, len(_E)), np.int64) if counting else None
     chunks = -(-tiles.total * padding * WORD_BYTES // CHUNK_BYTES) if counting else 0
     requests = np.zeros((parts, chunks), np.int64)
-    _find_all_tiles(parts, boxes, tiles, rule, simt.coalescing, aggregate, slots, table, requests)
+    coalescing = int(simt.coalescing)
+    for_parts(_find_tiles, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests)
     count = np.zeros(tiles.total, np.uint32)
     idx = np.zeros((len(boxes), tiles.slots**2), np.uint32)
     _place(slots, count, idx)
     if table is None:
         return count, idx, []
-    return count, idx, [_init_work(tiles, padding, simt), _address_work(boxes, tiles, table, requests.sum(axis=0), aggregate=aggregate)]
+    return (
+        count,
+        idx,
+        [
+            _init_work(tiles, padding, simt),
+            _address_work(boxes, tiles, table, requests.sum(axis=0), aggregate=aggregate),
+        ],
+    )
 
 
 def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
@@ -229,7 +230,7 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     table[:, BucketInitEvent.STORE_LANES] = sizes
     for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
         size = int(sizes[rows.start or 0])
-        stores = contiguous(0, size * WORD_BYTES, simt.coalescing)
+        stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
         table[rows, BucketInitEvent.STORE_TRANSACTIONS : BucketInitEvent.STORE_BYTES + 1] = stores
     stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
     return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))

@@ -99,19 +99,19 @@ def _work(kernel: str, size: int, table: NDArray[np.int64], shared_bytes: int, s
 def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:
     """Rows of all blocks with what both kernels do: each lane loads and stores a vector of four words."""
     table = np.zeros((-(-size // ELEMENTS), len(_E)), np.int64)
-    for block, row in enumerate(table):
-        elements = min(ELEMENTS, size - block * ELEMENTS)
-        traffic = contiguous(0, elements * WORD_BYTES, simt.coalescing)
-        row[_E.WARPS] = -(-BLOCK // simt.warp)
-        row[_E.LANES] = -(-elements * BLOCK // ELEMENTS)
-        row[_E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = traffic
-        row[_E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = traffic
+    table[:, _E.WARPS] = -(-BLOCK // simt.warp)
+    for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
+        elements = ELEMENTS if rows.start is None else size - (len(table) - 1) * ELEMENTS
+        traffic = contiguous(0, elements * WORD_BYTES, int(simt.coalescing))
+        table[rows, _E.LANES] = -(-elements * BLOCK // ELEMENTS)
+        table[rows, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = traffic
+        table[rows, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = traffic
     return table
 
 
 def _add_word(table: NDArray[np.int64], transactions: _E, simt: Simt) -> None:
     """One word more a block: its sum, stored by one lane or loaded by all."""
-    table[:, transactions : transactions + 2] += contiguous(0, WORD_BYTES, simt.coalescing)
+    table[:, transactions : transactions + 2] += contiguous(0, WORD_BYTES, int(simt.coalescing))
 
 
 def _scan_work(level: int, size: int, simt: Simt) -> Work:

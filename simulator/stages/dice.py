@@ -265,9 +265,9 @@ def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[n
     for first in range(0, grids * VERTICES, simt.warp):
         lanes = min(simt.warp, grids * VERTICES - first)
         lane = np.arange(first, first + lanes)
-        whole = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, simt.coalescing)
-        entry = transactions(lane // VERTICES * ENTRY_BYTES, lanes, ENTRY_BYTES, simt.coalescing)
+        whole = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, int(simt.coalescing))
+        entry = transactions(lane // VERTICES * ENTRY_BYTES, lanes, ENTRY_BYTES, int(simt.coalescing))
         box = np.where(lane % VERTICES == 0, lane // VERTICES * BOX_BYTES, -1)
         loads += np.add(whole, entry)
-        stores += np.add(whole, transactions(box, lanes, BOX_BYTES, simt.coalescing))
+        stores += np.add(whole, transactions(box, lanes, BOX_BYTES, int(simt.coalescing)))
     return loads, stores

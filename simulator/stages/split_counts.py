@@ -175,8 +175,8 @@ def transform_work(patches: int, simt: Simt) -> Work:
     table[:, _T.POINT_WARPS] = -(-threads // simt.warp)
     table[:, _T.POINT_LANES] = threads
     addresses = np.arange(simt.warp, dtype=np.int64) * POINT_BYTES
-    count, size = transactions(addresses, simt.warp, POINT_BYTES, simt.coalescing)
-    half = transactions(addresses, simt.warp // 2, POINT_BYTES, simt.coalescing)
+    count, size = transactions(addresses, simt.warp, POINT_BYTES, int(simt.coalescing))
+    half = transactions(addresses, simt.warp // 2, POINT_BYTES, int(simt.coalescing))
     odd = threads % simt.warp > 0  # points come by 16: the last warp may be half full
     for column, whole, part in ((_T.LOAD_TRANSACTIONS, count, half[0]), (_T.LOAD_BYTES, size, half[1])):
         moved = threads // simt.warp * whole + odd * part
@@ -197,7 +197,7 @@ def oracle_work(patch: NDArray[np.int32], path: NDArray[np.uint8], simt: Simt) -
     simt : Simt
     """
     table = np.zeros((_blocks(len(path)), len(_O)), np.int64)
-    for_parts(_count_blocks, parts_of(len(table)), patch, path, None, simt.warp, simt.coalescing, table)
+    for_parts(_count_blocks, parts_of(len(table)), patch, path, None, simt.warp, int(simt.coalescing), table)
     total = table.sum(axis=0)
     entries = len(path) * ENTRY_BYTES
     distinct = 1 + int(np.count_nonzero(np.diff(patch))) if len(patch) else 0
@@ -234,7 +234,7 @@ def subdivide_work(path: NDArray[np.uint8], places: NDArray[np.uint32], simt: Si
     simt : Simt
     """
     table = np.zeros((_blocks(len(path)), len(_S)), np.int64)
-    for_parts(_count_blocks, parts_of(len(table)), path, path, places, simt.warp, simt.coalescing, table)
+    for_parts(_count_blocks, parts_of(len(table)), path, path, places, simt.warp, int(simt.coalescing), table)
     total = table.sum(axis=0)
     loads = len(path) * (ENTRY_BYTES + 2 * WORD_BYTES)
     written = int(total[_S.KEEP_LANES] + 4 * total[_S.SPLIT_LANES]) * ENTRY_BYTES

@@ -12,12 +12,13 @@ outside a quad's box are charged for the edge functions and taken as misses.
 from typing import Literal
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.tile_range import Tiles
 from simulator.stages.tile_raster_events import (
     EDGE_VECTORS,
@@ -100,15 +101,6 @@ def _raster_rows(
                 count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _raster(parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table):
-    """All tiles, in parts."""
-    for part in prange(parts):
-        _raster_rows(
-            part, parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
-        )
-
-
 def tile_raster(
     vertices: NDArray[np.float32],
     count: NDArray[np.uint32],
@@ -175,8 +167,10 @@ def tile_raster(
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
     colors = vertices.view(np.uint32)[:, :, 3]
-    parts = get_num_threads()
-    _raster(parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table)
+    buffers = (image, depth, overdraw, table)
+    for_parts(
+        _raster_rows, parts_of(tiles.rows), vertices, colors, count, start, lists, tiles, shape, traffic, *buffers
+    )
     works = [] if table is None else [_work(shape, table, lists, len(vertices), traffic.grid_bytes)]
     return image, depth, overdraw, works
 
