@@ -4,7 +4,7 @@ Triangle setup culls and prepares, bin raster queues triangles by 128x128 pixels
 raster draws each 8x8 tile in shared memory.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -137,6 +137,8 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
         colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
+    variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
+    setup_work, fine_work = replace(setup_work, variant=mode), replace(fine_work, variant=variant)
     state.works += [setup_work, bin_work, tile_work, fine_work]
     if state.counting:
         drawn = int(np.count_nonzero(setup.subtriangles))

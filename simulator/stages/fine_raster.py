@@ -281,7 +281,11 @@ def fine_raster(
 def _streams(
     table: NDArray[np.int64], setup: Setup, entries: NDArray[np.int32], buffers: FrameBuffers, draw: Draw
 ) -> tuple[Stream, ...]:
-    """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers."""
+    """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
+
+    Tiles that share a triangle are drawn at about the same time: of headers and records what is read again is found in
+    a cache, and each passes once.
+    """
     E = FineRasterEvent
     total = table.sum(axis=0)
     lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
@@ -290,10 +294,11 @@ def _streams(
     pixels = 2 * buffers.depth.nbytes
     tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS << draw.log_samples
     rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
+    records = kept * setup.planes.shape[1] * 4
     return (
         Stream("tile_queues", "load", lists, entries.nbytes),
-        Stream("headers", "load", headers, kept * HEADER_BYTES),
-        Stream("triangle_data", "load", rest, kept * setup.planes.shape[1] * 4),
+        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES),
+        Stream("triangle_data", "load", min(rest, records), records),
         Stream("pixels", "load", tiles, pixels if tiles else 0),
         Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
     )

@@ -16,6 +16,7 @@ from models.simt import Simt
 from simulator.stages.borrow import borrow
 from simulator.stages.subtriangle import View
 from simulator.stages.triangle_setup_count import (
+    HEADER_BYTES,
     INDEX_BYTES,
     POSITION_BYTES,
     TriangleSetupEvent,
@@ -79,7 +80,7 @@ def _setup_range(
             if table is not None:
                 count_lane(table, t // BLOCK, longest, outcome, kept, fan, scratch.steps)
         if table is not None:
-            count_warp(table[warp // BLOCK], allocating, read, triangles, warp, last, out, simt, lanes)
+            count_warp(table[warp // BLOCK], allocating, read, triangles, warp, last, view, out, simt, lanes)
 
 
 @njit(cache=True, nogil=True)
@@ -236,7 +237,7 @@ def triangle_setup(
             out = _grown(out, needed)
             out.first[several] = F + np.cumsum(counts) - counts
             _setup_several(several, positions, triangles, view, out)
-    streams = _streams(table, positions, out, release)
+    streams = _streams(positions, out, view)
     work = Work(
         "triangle_setup",
         "triangleSetup",
@@ -250,22 +251,23 @@ def triangle_setup(
     return out, work, {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
 
 
-def _streams(
-    table: NDArray[np.int64], positions: NDArray[np.float32], out: Setup, release: Release
-) -> tuple[Stream, ...]:
-    """Buffers that setup reads and writes; footprints are those of what is really touched."""
-    E = TriangleSetupEvent
-    loaded, stored = int(table[:, E.LOAD_BYTES].sum()), int(table[:, E.STORE_BYTES].sum())
-    indices, kept = len(out.first) * INDEX_BYTES, int(out.subtriangles.sum(dtype=np.int64))
-    record = SUBTRIANGLE_BYTES[release] - 17
-    headers, data = kept * 16, kept * record
-    share = stored - len(out.first)
+def _streams(positions: NDArray[np.float32], out: Setup, view: View) -> tuple[Stream, ...]:
+    """Buffers that setup reads and writes, as L2 sees them.
+
+    Lanes of a block read what they share (words of a line, vertices of neighbours) through L1 and the texture cache,
+    and writes to one line meet in L2, so that each buffer passes once. Records are written in sectors of 32 bytes.
+    """
+    indices, vertices = len(out.first) * INDEX_BYTES, len(positions) * POSITION_BYTES
+    kept = int(out.subtriangles.sum(dtype=np.int64))
+    headers, data = kept * HEADER_BYTES, kept * out.planes.shape[1] * 4
+    if view.guard_band and not (view.depth or view.interpolate):
+        data //= 2
     return (
-        Stream("indices", "load", 3 * indices, indices),
-        Stream("positions", "load", max(loaded - 3 * indices, 0), len(positions) * POSITION_BYTES),
+        Stream("indices", "load", indices, indices),
+        Stream("positions", "load", vertices, vertices),
         Stream("subtriangles", "store", len(out.first), len(out.first)),
-        Stream("headers", "store", max(share * 16 // (16 + record), 0), headers),
-        Stream("triangle_data", "store", max(share * record // (16 + record), 0), data),
+        Stream("headers", "store", headers, headers),
+        Stream("triangle_data", "store", data, data),
     )
 
 

@@ -8,9 +8,11 @@ from numba import njit
 
 from models.coalescing import transactions
 from models.simt import Simt
+from simulator.stages.subtriangle import View
 from simulator.stages.triangle_setup_paths import OUTSIDE, Setup
 
 INDEX_BYTES, POSITION_BYTES, HEADER_BYTES = 12, 16, 16
+RECORD_PARTS = 4  # of 16 bytes, in release 1.1
 
 
 class TriangleSetupEvent(IntEnum):
@@ -81,9 +83,21 @@ def count_lane(table: Any, block: int, longest: Any, outcome: int, kept: int, fa
 
 @njit(cache=True, nogil=True)
 def count_warp(
-    row: Any, allocating: int, positions_read: Any, triangles: Any, t0: int, t1: int, out: Setup, simt: Simt, lanes: Any
+    row: Any,
+    allocating: int,
+    positions_read: Any,
+    triangles: Any,
+    t0: int,
+    t1: int,
+    view: View,
+    out: Setup,
+    simt: Simt,
+    lanes: Any,
 ) -> None:
-    """Count what the warp of triangles t0..t1-1 does to memory."""
+    """Count what the warp of triangles t0..t1-1 does to memory.
+
+    Of a record of 1.1 the first 16 bytes are written for depth alone, the middle 32 for interpolation alone.
+    """
     row[0] += 1
     if allocating > 0:
         row[15] += 1
@@ -114,6 +128,8 @@ def count_warp(
     row[22] += count
     row[23] += size
     for part in range(words):
+        if words == RECORD_PARTS and not (part == RECORD_PARTS - 1 or (view.interpolate if part else view.depth)):
+            continue
         for i in range(n):
             lanes[i] = (t0 + i) * HEADER_BYTES * words + 16 * part if out.subtriangles[t0 + i] == 1 else -1
         count, size = transactions(lanes, n, HEADER_BYTES, simt.coalescing)

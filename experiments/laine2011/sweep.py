@@ -1,0 +1,91 @@
+"""The synthetic sweep of Figure 5, executed once an area; which areas are drawn, and which of them were fitted on."""
+
+import os
+from functools import cache
+
+import numpy as np
+
+from experiments.published import published
+from models.errors import TilestampError
+from models.machine import load_machine
+from simulator.frame import Frame
+from simulator.pipelines import load_pipeline
+from simulator.run import Run
+from simulator.scenes import Scene
+
+SOURCE = "Laine & Karras, High-Performance Software Rasterization on GPUs, HPG 2011, and the benchmark of release 1.1"
+MACHINE = "gtx480"
+WIDTH, HEIGHT = 1024, 768
+STAGES = {"triangle_setup": "setup", "bin_raster": "bin", "coarse_raster": "coarse", "fine_raster": "fine"}
+PUBLISHED_AREAS = tuple(tick / 4 for tick in range(161))
+FITTED_AREAS = (0.0, 0.25, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 40.0)  # simulator/mixes/cudaraster/cc2.toml
+DEFAULT_AREAS = (0.0, 0.25, 0.5, 1.0, 1.75, 2.0, 4.0, 8.0, 12.0, 16.0, 27.0, 40.0)
+VARIABLE = "TILESTAMP_SWEEP"  # "all" for the 161 published areas, or areas: "0.5,3,17"
+
+
+def areas() -> tuple[float, ...]:
+    """Areas to draw, in pixels a triangle: a dozen, unless the environment variable TILESTAMP_SWEEP names others.
+
+    Raises
+    ------
+    TilestampError
+        An area that the authors did not measure.
+    """
+    asked = os.environ.get(VARIABLE, "")
+    if not asked:
+        return DEFAULT_AREAS
+    if asked == "all":
+        return PUBLISHED_AREAS
+    try:
+        chosen = tuple(sorted({float(area) for area in asked.split(",")}))
+    except ValueError:
+        chosen = ()
+    if not chosen or not set(chosen) <= set(PUBLISHED_AREAS):
+        raise TilestampError(
+            f"{VARIABLE} is {asked!r}; it takes 'all' or areas in steps of 0.25 up to 40, as '0.5,3,17'"
+        )
+    return chosen
+
+
+@cache
+def draw(area: float) -> tuple[Run, int]:
+    """Draw one area; give the run without its picture, and its triangles."""
+    machine = load_machine(MACHINE)
+    scene = Scene.sweep(area, WIDTH, HEIGHT)
+    frame = load_pipeline("cudaraster")(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, mode="color")
+    assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
+    nothing = np.empty((0, 0, 3), np.uint8)
+    bare = Frame(nothing, nothing, frame.works, facts=frame.facts)
+    options = {"mode": "color"}
+    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", options, bare)
+    return run, len(scene.mesh.triangles)
+
+
+def nanoseconds(run: Run, triangles: int) -> dict[str, float]:
+    """Time of each stage for one triangle."""
+    return {stage: float(run.stages.loc[stage, "milliseconds"]) * 1e6 / triangles for stage in STAGES}
+
+
+def fitted_entries() -> int:
+    """Numbers of the mix that were chosen on the sweep."""
+    from simulator.mix import load_mix
+
+    return sum(
+        kind == "fitted"
+        for name, kernel in load_mix("cudaraster", "2.0").kernels.items()
+        if ":" not in name or name.endswith("color")
+        for kind, _ in kernel.provenance.values()
+    )
+
+
+@cache
+def published_ns() -> dict[tuple[float, str], float]:
+    """Published nanoseconds a triangle by (area, stage)."""
+    log = published(__file__, "gtx480-cuda40")
+    rows = log[(log["table"] == "figure5") & (log["renderer"] == "CudaRaster")]
+    names = {f"{short}_ms": stage for stage, short in STAGES.items()}
+    return {
+        (float(row.key.removeprefix("area=")), names[row.column]): float(row.value)
+        for row in rows.itertuples()
+        if row.column in names
+    }
