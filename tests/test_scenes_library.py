@@ -9,9 +9,9 @@ from PIL import Image
 
 from models.errors import TilestampError
 from simulator.scenes import Scene, list_scenes, load_scene
-from simulator.scenes.library import bounds, scene_or_stand_in, stand_in, with_mesh
+from simulator.scenes.library import bounds, scene_or_stand_in, stand_in
 from simulator.scenes.search_path import SCENES_VARIABLE, find_scene
-from simulator.scenes.subpatches import split_to_count, tessellate
+from simulator.scenes.subpatches import split_to_count, tessellate, with_mesh
 from tests import naive_scenes
 from tests.test_scenes_bpt import write as write_bpt
 from tests.test_scenes_meshes import SQUARE

@@ -16,7 +16,7 @@ from simulator.scenes.obj_file import read_obj
 from simulator.scenes.quad_cage import cage_of
 from simulator.scenes.scene import Patches, Scene
 from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
-from simulator.scenes.subpatches import split_to_count, tessellate
+from simulator.scenes.subpatches import split_to_count, with_mesh
 from simulator.scenes.textured_mesh import read_gltf
 from simulator.scenes.textured_obj import read_textured_obj
 from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
@@ -46,8 +46,6 @@ NOT_SHIPPED = {
 GLTF_SUFFIXES = (".glb", ".gltf")  # read with their textures, which trimesh would leave to its materials
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
 STAND_IN_SIZE = 0.9  # diagonal of its box over the model's: the cow is stouter, and must lie inside the same views
-MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
-FINEST_TESSELLATION = 16  # quads along a patch
 
 
 def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: Kind = None) -> Scene:
@@ -119,16 +117,6 @@ def scene_or_stand_in(name: str, scene_path: SearchPath = None) -> Scene:
     if name in NOT_SHIPPED and find_scene(name, scene_path) is None:
         return stand_in(name)
     return load_scene(name, scene_path)
-
-
-def with_mesh(scene: Scene) -> Scene:
-    """Give a scene that has a mesh: its patches cut into triangles, where it has none of its own."""
-    if scene.mesh is not None:
-        return scene
-    if scene.patches is None:
-        raise TilestampError(f"scene {scene.name!r} has neither patches nor triangles")
-    cells = int(np.sqrt(MOST_TRIANGLES / (2 * len(scene.patches.points))))
-    return replace(scene, mesh=tessellate(scene.patches, min(max(cells, 1), FINEST_TESSELLATION)))
 
 
 def with_views(scene: Scene, up: ArrayLike | None = None) -> Scene:

@@ -1,14 +1,19 @@
 """Cut patches into smaller patches, and into triangles."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
-from simulator.scenes.scene import Mesh, Patches
+from simulator.scenes.scene import Mesh, Patches, Scene
 
 # De Casteljau at one half: the control points of the first half of a cubic; the second half is its mirror image.
 FIRST_HALF = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
 SECOND_HALF = FIRST_HALF[::-1, ::-1]
+
+MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
+FINEST_TESSELLATION = 16  # quads along a patch
 
 Nets = NDArray[np.float64]
 
@@ -30,6 +35,16 @@ def split_to_count(patches: Patches, count: int) -> Patches:
     parts[by_size[:quartered]] = 4
     parts[by_size[quartered : quartered + 1]] += rest
     return Patches(_split(nets, parts).reshape(-1, 16, 4).astype(np.float32))
+
+
+def with_mesh(scene: Scene) -> Scene:
+    """Give a scene that has a mesh: its patches cut into triangles, where it has none of its own."""
+    if scene.mesh is not None:
+        return scene
+    if scene.patches is None:
+        raise TilestampError(f"scene {scene.name!r} has neither patches nor triangles")
+    cells = int(np.sqrt(MOST_TRIANGLES / (2 * len(scene.patches.points))))
+    return replace(scene, mesh=tessellate(scene.patches, min(max(cells, 1), FINEST_TESSELLATION)))
 
 
 def tessellate(patches: Patches, cells: int) -> Mesh:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from simulator.scenes.gltf_file import TRIANGLES, GltfFile
 from simulator.scenes.scene import Mesh, Scene
+from simulator.scenes.subpatches import with_mesh
 
 
 class Geometry(NamedTuple):
@@ -40,14 +41,14 @@ class Geometry(NamedTuple):
 
 
 def geometry(scene: Scene) -> Geometry:
-    """Fill in what a scene's mesh lacks.
+    """Fill in what a scene's mesh lacks; patches are cut into triangles where there is no mesh.
 
     Raises
     ------
     TilestampError
         The scene has no triangles.
     """
-    mesh = scene.mesh
+    mesh = with_mesh(scene).mesh
     if mesh is None or len(mesh.triangles) == 0:
         raise TilestampError(f"the scene {scene.name} has no triangles, which the textured pipelines draw")
     count = len(mesh.positions)

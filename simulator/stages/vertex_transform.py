@@ -7,8 +7,8 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
-from simulator.scenes.library import with_mesh
 from simulator.scenes.scene import Mesh, Scene
+from simulator.scenes.subpatches import with_mesh
 
 ALPHA = np.float32(0.5)  # of colours made here, as in the published benchmarks
 AMBIENT = np.float32(0.2)
