@@ -92,15 +92,10 @@ def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
     """
     for k in range(4):
         for n in range(side.shape[0]):
-            set_parameter(rows, slopes, k, n, np.float32(np.int32(3) * first[n] + np.int32(k)) * side[n] / THREE)
-
-
-@njit(cache=True, nogil=True)
-def set_parameter(rows: Any, slopes: Any, k: Any, n: Any, a: Any) -> Any:
-    """Fill the tables of lane ``n`` for its parameter ``k``, which is ``a``."""
-    A = ONE - a
-    rows[0, k, n], rows[1, k, n], rows[2, k, n], rows[3, k, n] = _bernstein(a, A)
-    slopes[0, k, n], slopes[1, k, n], slopes[2, k, n] = A * A, TWO * a * A, a * a
+            a = np.float32(np.int32(3) * first[n] + np.int32(k)) * side[n] / THREE
+            A = ONE - a
+            rows[0, k, n], rows[1, k, n], rows[2, k, n], rows[3, k, n] = _bernstein(a, A)
+            slopes[0, k, n], slopes[1, k, n], slopes[2, k, n] = A * A, TWO * a * A, a * a
 
 
 @njit(cache=True, nogil=True)
@@ -191,6 +186,24 @@ def evaluate(
         _slopes_along_u(between, slope_u, along_u, d)
         _slopes_along_v(net, d, slope_v, between)
         _along_u(between, by_u, along_v, d)
+
+
+@njit(cache=True, nogil=True)
+def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> Any:
+    """Point of lane ``n`` at (u, v), and thirds of its derivatives along u and v: ``values[d]``, as ``evaluate``."""
+    U, V = ONE - u, ONE - v
+    by_u, by_v = _bernstein(u, U), _bernstein(v, V)
+    rows = np.empty((2, 4), np.float32)
+    for d in range(net.shape[0]):
+        for x in range(4):
+            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+            rows[0, x] = by_v[0] * p0 + by_v[1] * p1 + by_v[2] * p2 + by_v[3] * p3
+            rows[1, x] = V * V * (p1 - p0) + TWO * v * V * (p2 - p1) + v * v * (p3 - p2)
+        p0, p1, p2, p3 = rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3]
+        values[d, 0] = by_u[0] * p0 + by_u[1] * p1 + by_u[2] * p2 + by_u[3] * p3
+        values[d, 1] = U * U * (p1 - p0) + TWO * u * U * (p2 - p1) + u * u * (p3 - p2)
+        p0, p1, p2, p3 = rows[1, 0], rows[1, 1], rows[1, 2], rows[1, 3]
+        values[d, 2] = by_u[0] * p0 + by_u[1] * p1 + by_u[2] * p2 + by_u[3] * p3
 
 
 def screen_points(points: NDArray[np.float32], matrix: ArrayLike, width: int, height: int) -> NDArray[np.float32]:

@@ -25,15 +25,15 @@ from simulator.stages.bezier import (
     LANES,
     basis,
     evaluate,
+    evaluate_point,
     gather,
     new_squares,
     restrict,
     screen_points,
-    set_parameter,
     set_square,
 )
 from simulator.stages.bound_and_split import SubPatches
-from simulator.stages.shading import MATT, NORMAL, NUDGE, lighting, new_grid, packed_color, set_normals, shade
+from simulator.stages.shading import MATT, NORMAL, NUDGE, lighting, new_grid, packed_color, set_normals, shade, tangent
 from simulator.work import Work
 
 BLOCK = 256  # threads, a vertex each: 16 sub-patches
@@ -69,21 +69,11 @@ _E = DiceEvent
 
 
 @njit(cache=True, nogil=True)
-def _evaluate(grid: Any, net: Any) -> Any:
-    """Points, tangents and normals of grids from the control nets (D, 16, LANES); vertices without a normal."""
-    evaluate(
-        net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
-    )
-    return set_normals(grid.rows)
-
-
-@njit(cache=True, nogil=True)
-def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any, spare: Any, one: Any) -> Any:
-    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch.
-
-    ``spare`` and ``one`` are a grid and a net of which only the first vertex in the first lane counts.
-    """
+def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
+    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
     middle = np.float32(0.5)
+    values = np.zeros((4, 3), np.float32)  # a coordinate a row: point, derivatives along u and v
+    values[3, 0] = 1
     for n in range(lanes):
         for k in range(VERTICES):
             at = k * LANES + n
@@ -91,14 +81,12 @@ def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any, spare: Any, o
                 continue
             u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / np.float32(3)
             v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / np.float32(3)
-            set_parameter(spare.by_u, spare.slope_u, 0, 0, u + (middle - u) * NUDGE)
-            set_parameter(spare.by_v, spare.slope_v, 0, 0, v + (middle - v) * NUDGE)
-            for d in range(net.shape[0]):
-                for point in range(VERTICES):
-                    one[d, point, 0] = net[d, point, n]
-            _evaluate(spare, one)
-            for row in range(NORMAL, NORMAL + 3 * shading.VERTICES, shading.VERTICES):
-                grid.rows[row + at] = spare.rows[row]
+            evaluate_point(net, n, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE, values)
+            ux, uy, uz = tangent(values, 1)
+            vx, vy, vz = tangent(values, 2)
+            grid.rows[NORMAL + at] = uy * vz - uz * vy
+            grid.rows[NORMAL + shading.VERTICES + at] = uz * vx - ux * vz
+            grid.rows[NORMAL + 2 * shading.VERTICES + at] = ux * vy - uy * vx
 
 
 @njit(cache=True, nogil=True)
@@ -143,9 +131,8 @@ def _dice(
     boxes: Any,
 ) -> Any:
     """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
-    grid, spare, squares = new_grid(side, width), new_grid(side, width), new_squares(width)
+    grid, squares = new_grid(side, width), new_squares(width)
     corners, net = np.empty((4, VERTICES, width), np.float32), np.empty((nets.shape[1], VERTICES, width), np.float32)
-    one = np.zeros((nets.shape[1], VERTICES, width), np.float32)
     number = boxes.shape[0]
     batches = (number + LANES - 1) // LANES
     for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):
@@ -158,8 +145,11 @@ def _dice(
         restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
         _project(grid.rows)
         gather(nets, squares.patch, net)
-        if _evaluate(grid, net):
-            _borrow_normals(grid, net, squares, lanes, spare, one)
+        evaluate(
+            net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
+        )
+        if set_normals(grid.rows):
+            _borrow_normals(grid, net, squares, lanes)
         shade(grid, light, texture, squares)
         _store_grids(grid, first, lanes, vertices, colors, boxes)
 

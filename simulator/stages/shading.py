@@ -129,6 +129,17 @@ def set_normals(s: Any) -> Any:
     return missing
 
 
+@njit(cache=True, nogil=True)
+def tangent(values: Any, along: Any) -> Any:
+    """Tangent of x/w, y/w, z/w up to a positive factor, from a point and its derivatives, a coordinate a row."""
+    w, dw = values[3, 0], values[3, along]
+    return (
+        values[0, along] * w - values[0, 0] * dw,
+        values[1, along] * w - values[1, 0] * dw,
+        values[2, along] * w - values[2, 0] * dw,
+    )
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> Any:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
