@@ -128,12 +128,13 @@ def test_a_batch_holds_as_many_grids_as_the_block_has_threads_for():
     assert works[0].table[:, Event.BATCHES].tolist() == [-(-len(members) // 4) for members in lists]
 
 
-@pytest.mark.parametrize(("simt", "transactions"), [(GT200, 2), (H200, 8)])
-def test_a_grid_of_256_bytes_is_two_segments_or_eight_sectors(simt, transactions):
+@pytest.mark.parametrize(("simt", "transactions", "start"), [(GT200, 2, 4), (H200, 8, 2)])
+def test_a_grid_of_256_bytes_is_two_segments_or_eight_sectors(simt, transactions, start):
+    """Beside the first grid: its index, and START, which each warp (GT200: half-warp) reads where there are grids."""
     one, none = some_grids(1, 0.1), some_grids(0)
     one[..., :2] = one[..., :2] % 1 + 2
     more = drawn(one, simt=simt)[3][0].total(Event.LOAD_TRANSACTIONS)
-    assert more - drawn(none, simt=simt)[3][0].total(Event.LOAD_TRANSACTIONS) == transactions + 1  # and its index
+    assert more - drawn(none, simt=simt)[3][0].total(Event.LOAD_TRANSACTIONS) == transactions + 1 + start
 
 
 def test_loading_edge_equations_costs_432_bytes_a_grid_and_saves_computing_them():

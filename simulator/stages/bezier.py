@@ -1,8 +1,9 @@
 """Bicubic Bezier patches by parameter: restriction to a square of the parameter domain, basis and tangent rows.
 
-Sixteen sub-patches are worked on side by side: arrays end in an axis of ``LANES``, and each innermost loop runs over
-it. LLVM makes vectors of such loops, but unrolls what it knows to have few turns: so lengths are read from the arrays,
-whose shape drivers give. Each lane does the same float32 operations in the same order as one alone would.
+Sixteen sub-patches are worked on side by side: each innermost loop runs over ``LANES`` of them, and LLVM makes vectors
+of it. For that, arrays are flat, their axes given in the comments: constant distances show that they do not overlap;
+and their lengths are not known to the compiler, which would unroll short loops instead. Each lane does the same float32
+operations in the same order as one alone would.
 """
 
 from typing import Any, NamedTuple
@@ -48,11 +49,11 @@ def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
 @njit(cache=True, nogil=True)
 def gather(points: Any, patch: Any, net: Any) -> Any:
     """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
-    for lane in range(net.shape[2]):
+    for lane in range(LANES):
         p = patch[lane]
-        for d in range(net.shape[0]):
+        for d in range(net.shape[0] // (POINTS * LANES)):
             for k in range(POINTS):
-                net[d, k, lane] = points[p, d, k]
+                net[(POINTS * d + k) * LANES + lane] = points[p, d, k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -64,12 +65,12 @@ def restriction(first: Any, side: Any, rows: Any) -> Any:
     for n in range(side.shape[0]):
         a, b = np.float32(first[n]) * side[n], np.float32(first[n] + np.int32(1)) * side[n]
         A, B = ONE - a, ONE - b
-        rows[0, 0, n], rows[1, 0, n], rows[2, 0, n], rows[3, 0, n] = _bernstein(a, A)
-        rows[0, 1, n], rows[1, 1, n] = A * A * B, A * (A * b + TWO * a * B)
-        rows[2, 1, n], rows[3, 1, n] = a * (a * B + TWO * A * b), a * a * b
-        rows[0, 2, n], rows[1, 2, n] = A * B * B, B * (a * B + TWO * A * b)
-        rows[2, 2, n], rows[3, 2, n] = b * (A * b + TWO * a * B), a * b * b
-        rows[0, 3, n], rows[1, 3, n], rows[2, 3, n], rows[3, 3, n] = _bernstein(b, B)
+        rows[0 * LANES + n], rows[4 * LANES + n], rows[8 * LANES + n], rows[12 * LANES + n] = _bernstein(a, A)
+        rows[1 * LANES + n], rows[5 * LANES + n] = A * A * B, A * (A * b + TWO * a * B)
+        rows[9 * LANES + n], rows[13 * LANES + n] = a * (a * B + TWO * A * b), a * a * b
+        rows[2 * LANES + n], rows[6 * LANES + n] = A * B * B, B * (a * B + TWO * A * b)
+        rows[10 * LANES + n], rows[14 * LANES + n] = b * (A * b + TWO * a * B), a * b * b
+        rows[3 * LANES + n], rows[7 * LANES + n], rows[11 * LANES + n], rows[15 * LANES + n] = _bernstein(b, B)
 
 
 @njit(cache=True, nogil=True)
@@ -94,41 +95,58 @@ def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
         for n in range(side.shape[0]):
             a = np.float32(np.int32(3) * first[n] + np.int32(k)) * side[n] / THREE
             A = ONE - a
-            rows[0, k, n], rows[1, k, n], rows[2, k, n], rows[3, k, n] = _bernstein(a, A)
-            slopes[0, k, n], slopes[1, k, n], slopes[2, k, n] = A * A, TWO * a * A, a * a
+            (
+                rows[(0 + k) * LANES + n],
+                rows[(4 + k) * LANES + n],
+                rows[(8 + k) * LANES + n],
+                rows[(12 + k) * LANES + n],
+            ) = _bernstein(a, A)
+            slopes[(0 + k) * LANES + n], slopes[(4 + k) * LANES + n], slopes[(8 + k) * LANES + n] = (
+                A * A,
+                TWO * a * A,
+                a * a,
+            )
 
 
 @njit(cache=True, nogil=True)
 def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
-    return w[0, k, n] * p0 + w[1, k, n] * p1 + w[2, k, n] * p2 + w[3, k, n] * p3
+    return (
+        w[(0 + k) * LANES + n] * p0
+        + w[(4 + k) * LANES + n] * p1
+        + w[(8 + k) * LANES + n] * p2
+        + w[(12 + k) * LANES + n] * p3
+    )
 
 
 @njit(cache=True, nogil=True)
 def _weigh_steps(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
-    return w[0, k, n] * (p1 - p0) + w[1, k, n] * (p2 - p1) + w[2, k, n] * (p3 - p2)
+    return w[(0 + k) * LANES + n] * (p1 - p0) + w[(4 + k) * LANES + n] * (p2 - p1) + w[(8 + k) * LANES + n] * (p3 - p2)
 
 
 @njit(cache=True, nogil=True)
 def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
     """Contract the rows of coordinate d of a net: ``between[r, x]``."""
-    for x in range(between.shape[1]):
-        for n in range(between.shape[2]):
-            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+    for x in range(4):
+        for n in range(between.shape[0] // POINTS):
+            at = (POINTS * d + x) * LANES + n
+            p0, p1, p2, p3 = net[at], net[at + 4 * LANES], net[at + 8 * LANES], net[at + 12 * LANES]
             q0, q1 = _weigh(by_v, 0, n, p0, p1, p2, p3), _weigh(by_v, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh(by_v, 2, n, p0, p1, p2, p3), _weigh(by_v, 3, n, p0, p1, p2, p3)
-            between[0, x, n], between[1, x, n], between[2, x, n], between[3, x, n] = q0, q1, q2, q3
+            at = x * LANES + n
+            between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
 def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
     """Contract the columns: ``out[d, 4 r + c]``."""
-    for r in range(between.shape[0]):
-        for n in range(between.shape[2]):
-            p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
+    for r in range(4):
+        for n in range(between.shape[0] // POINTS):
+            at = 4 * r * LANES + n
+            p0, p1, p2, p3 = between[at], between[at + LANES], between[at + 2 * LANES], between[at + 3 * LANES]
             q0, q1 = _weigh(by_u, 0, n, p0, p1, p2, p3), _weigh(by_u, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh(by_u, 2, n, p0, p1, p2, p3), _weigh(by_u, 3, n, p0, p1, p2, p3)
-            k = 4 * r
-            out[d, k, n], out[d, k + 1, n], out[d, k + 2, n], out[d, k + 3, n] = q0, q1, q2, q3
+            at += POINTS * d * LANES
+            out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
@@ -144,7 +162,7 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
         Scratch.
     out : ndarray, (D, 16, LANES), float32
     """
-    for d in range(out.shape[0]):
+    for d in range(out.shape[0] // (POINTS * LANES)):
         _along_v(net, d, by_v, between)
         _along_u(between, by_u, out, d)
 
@@ -152,24 +170,27 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
 @njit(cache=True, nogil=True)
 def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
     """Contract the differences of neighbouring columns."""
-    for r in range(between.shape[0]):
-        for n in range(between.shape[2]):
-            p0, p1, p2, p3 = between[r, 0, n], between[r, 1, n], between[r, 2, n], between[r, 3, n]
+    for r in range(4):
+        for n in range(between.shape[0] // POINTS):
+            at = 4 * r * LANES + n
+            p0, p1, p2, p3 = between[at], between[at + LANES], between[at + 2 * LANES], between[at + 3 * LANES]
             q0, q1 = _weigh_steps(slope_u, 0, n, p0, p1, p2, p3), _weigh_steps(slope_u, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh_steps(slope_u, 2, n, p0, p1, p2, p3), _weigh_steps(slope_u, 3, n, p0, p1, p2, p3)
-            k = 4 * r
-            out[d, k, n], out[d, k + 1, n], out[d, k + 2, n], out[d, k + 3, n] = q0, q1, q2, q3
+            at += POINTS * d * LANES
+            out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
 def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
     """Contract the differences of neighbouring rows."""
-    for x in range(between.shape[1]):
-        for n in range(between.shape[2]):
-            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+    for x in range(4):
+        for n in range(between.shape[0] // POINTS):
+            at = (POINTS * d + x) * LANES + n
+            p0, p1, p2, p3 = net[at], net[at + 4 * LANES], net[at + 8 * LANES], net[at + 12 * LANES]
             q0, q1 = _weigh_steps(slope_v, 0, n, p0, p1, p2, p3), _weigh_steps(slope_v, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh_steps(slope_v, 2, n, p0, p1, p2, p3), _weigh_steps(slope_v, 3, n, p0, p1, p2, p3)
-            between[0, x, n], between[1, x, n], between[2, x, n], between[3, x, n] = q0, q1, q2, q3
+            at = x * LANES + n
+            between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
 @njit(cache=True, nogil=True)
@@ -180,7 +201,7 @@ def evaluate(
 
     Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
     """
-    for d in range(net.shape[0]):
+    for d in range(net.shape[0] // (POINTS * LANES)):
         _along_v(net, d, by_v, between)
         _along_u(between, by_u, out, d)
         _slopes_along_u(between, slope_u, along_u, d)
@@ -194,9 +215,10 @@ def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> Any:
     U, V = ONE - u, ONE - v
     by_u, by_v = _bernstein(u, U), _bernstein(v, V)
     rows = np.empty((2, 4), np.float32)
-    for d in range(net.shape[0]):
+    for d in range(net.shape[0] // (POINTS * LANES)):
         for x in range(4):
-            p0, p1, p2, p3 = net[d, x, n], net[d, x + 4, n], net[d, x + 8, n], net[d, x + 12, n]
+            at = (POINTS * d + x) * LANES + n
+            p0, p1, p2, p3 = net[at], net[at + 4 * LANES], net[at + 8 * LANES], net[at + 12 * LANES]
             rows[0, x] = by_v[0] * p0 + by_v[1] * p1 + by_v[2] * p2 + by_v[3] * p3
             rows[1, x] = V * V * (p1 - p0) + TWO * v * V * (p2 - p1) + v * v * (p3 - p2)
         p0, p1, p2, p3 = rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3]

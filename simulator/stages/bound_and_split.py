@@ -90,16 +90,17 @@ class _Scratch(NamedTuple):
 
 _BEHIND, _NOT_FRONT = np.int32(16), np.int32(32)  # bits: w <= 0; w > 0 does not hold (it may be no number)
 _OFF_SCREEN = np.int32(31)
+_ROW = POINTS * LANES  # a coordinate of all points
 
 
 @njit(cache=True, nogil=True)
 def _new_scratch(side: Any, lanes: Any) -> Any:
     return _Scratch(
-        np.empty((4, side, lanes), np.float32),
-        np.empty((4, side, lanes), np.float32),
-        np.empty((side, side, lanes), np.float32),
-        np.empty((3, POINTS, lanes), np.float32),
-        np.empty((3, POINTS, lanes), np.float32),
+        np.empty(4 * side * lanes, np.float32),
+        np.empty(4 * side * lanes, np.float32),
+        np.empty(side * side * lanes, np.float32),
+        np.empty(3 * POINTS * lanes, np.float32),
+        np.empty(3 * POINTS * lanes, np.float32),
         np.empty(lanes, np.int32),
         np.empty(lanes, np.int32),
         np.empty((4, lanes), np.float32),
@@ -122,16 +123,17 @@ def _measure(s: Any, width: Any, height: Any) -> Any:
     s.anywhere[:] = 0
     box[:2] = np.inf
     box[2:] = -np.inf
-    for k in range(net.shape[1]):
-        for n in range(net.shape[2]):
-            x, y, w = net[0, k, n], net[1, k, n], net[2, k, n]
+    lanes = s.everywhere.shape[0]
+    for k in range(0, POINTS * LANES, LANES):
+        for n in range(lanes):
+            x, y, w = net[k + n], net[_ROW + k + n], net[2 * _ROW + k + n]
             out = np.int32(x < 0) | np.int32(x > width * w) << 1 | np.int32(y < 0) << 2 | np.int32(y > height * w) << 3
             out |= np.int32(w <= 0) << 4 | np.int32(not w > 0) << 5
             s.everywhere[n] &= out
             s.anywhere[n] |= out
-        for n in range(net.shape[2]):
-            scale = np.float32(1) / net[2, k, n]
-            x, y = net[0, k, n] * scale, net[1, k, n] * scale
+        for n in range(lanes):
+            scale = np.float32(1) / net[2 * _ROW + k + n]
+            x, y = net[k + n] * scale, net[_ROW + k + n] * scale
             box[0, n], box[1, n] = min(box[0, n], x), min(box[1, n], y)
             box[2, n], box[3, n] = max(box[2, n], x), max(box[3, n], y)
 

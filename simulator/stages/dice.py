@@ -97,8 +97,9 @@ def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, 
         x0 = y0 = np.float32(np.inf)
         x1 = y1 = np.float32(-np.inf)
         for k in range(VERTICES):
-            x, y = screen[0, k, n], screen[1, k, n]
-            vertices[first + n, k, 0], vertices[first + n, k, 1], vertices[first + n, k, 2] = x, y, screen[3, k, n]
+            x, y = screen[k * LANES + n], screen[shading.VERTICES + k * LANES + n]
+            z = screen[3 * shading.VERTICES + k * LANES + n]
+            vertices[first + n, k, 0], vertices[first + n, k, 1], vertices[first + n, k, 2] = x, y, z
             colors[first + n, k, 3] = packed_color(grid.rows, k * LANES + n)
             x0, x1 = min(x0, x), max(x1, x)
             y0, y1 = min(y0, y), max(y1, y)
@@ -132,7 +133,7 @@ def _dice(
 ) -> Any:
     """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
     grid, squares = new_grid(side, width), new_squares(width)
-    corners, net = np.empty((4, VERTICES, width), np.float32), np.empty((nets.shape[1], VERTICES, width), np.float32)
+    corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)
     number = boxes.shape[0]
     batches = (number + LANES - 1) // LANES
     for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):

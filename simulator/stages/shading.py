@@ -63,16 +63,16 @@ def new_grid(side: Any, lanes: Any) -> Any:
     rows = np.zeros(ROWS, np.float32)
     rows[POINT + 3 * VERTICES : POINT + 4 * VERTICES] = 1
     return Grid(
-        np.zeros((4, side, lanes), np.float32),
-        np.zeros((4, side, lanes), np.float32),
-        np.zeros((3, side, lanes), np.float32),
-        np.zeros((3, side, lanes), np.float32),
-        np.zeros((side, side, lanes), np.float32),
+        np.zeros(4 * side * lanes, np.float32),
+        np.zeros(4 * side * lanes, np.float32),
+        np.zeros(3 * side * lanes, np.float32),
+        np.zeros(3 * side * lanes, np.float32),
+        np.zeros(side * side * lanes, np.float32),
         rows,
-        rows[SCREEN : SCREEN + 4 * VERTICES].reshape(4, 16, lanes),
-        rows[POINT : POINT + 4 * VERTICES].reshape(4, 16, lanes),
-        rows[ALONG_U : ALONG_U + 4 * VERTICES].reshape(4, 16, lanes),
-        rows[ALONG_V : ALONG_V + 4 * VERTICES].reshape(4, 16, lanes),
+        rows[SCREEN : SCREEN + 4 * VERTICES],
+        rows[POINT : POINT + 4 * VERTICES],
+        rows[ALONG_U : ALONG_U + 4 * VERTICES],
+        rows[ALONG_V : ALONG_V + 4 * VERTICES],
     )
 
 
