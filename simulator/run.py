@@ -15,7 +15,7 @@ from models.timing import Timing
 from simulator.frame import Frame
 from simulator.mix import load_mix
 from simulator.stage_table import stage_table
-from simulator.work import Work
+from simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,6 +53,8 @@ class Run:
     @cached_property
     def launches(self) -> list[Launch | PipeLaunch]:
         """One for each kernel launch, in machine events."""
+        if not any(isinstance(work, Work) for work in self.frame.works):  # fixed function alone needs no mix
+            return [work.launch() for work in self.frame.works if isinstance(work, FixedFunctionWork)]
         mix = load_mix(self.pipeline, self.machine.compute_capability)
         return [
             mix.launch(work, self.machine.sm.warp_size) if isinstance(work, Work) else work.launch()

@@ -1,0 +1,114 @@
+"""Figure 6: a frame in 1 to 14 batches: time of each stage, GTX 480 (Laine & Karras 2011)."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, STAGES, WIDTH
+from experiments.laine2011.table3 import CAMERA, FULL, buddha, load_buddha, reduced_warning
+from experiments.published import published
+from experiments.registry import Progress
+from experiments.result import Cell, Figure, Result
+from reports.plots import lines
+from simulator.scenes import load_scene
+from simulator.scenes.search_path import find_scene
+from simulator.simulation import simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BATCHES = (1, 2, 4, 8, 14)
+FAIRY_STAND_IN = "littlest_tokyo"  # 141,802 triangles of many sizes; FairyForest has 174,117
+AIM = 0.5
+
+
+def run(progress: Progress) -> Result:
+    """Draw each scene in several batches, and compare what a further batch costs."""
+    import pandas as pd
+
+    cells: list[Cell] = []
+    rows = []
+    for published_name, name in _scenes().items():
+        for batches in BATCHES:
+            progress(f"laine2011/figure6: {name}, {batches} batches")
+            rows += [{"scene": published_name, **row} for row in _times(name, batches)]
+        ours = pd.DataFrame([row for row in rows if row["scene"] == published_name])
+        cells += slope_cells(published_name, name, ours)
+    table = pd.DataFrame(rows)
+    warnings = [reduced_warning()] if "Buddha" in _scenes() and buddha() != FULL else []
+    warnings.append(f"STAND-IN for FairyForest: {FAIRY_STAND_IN}, from a fitted camera")
+    return Result(
+        "laine2011-figure6",
+        "Figure 6: cost of a further batch, 1024x768, GTX 480",
+        SOURCE,
+        cells,
+        [Figure("batches", lambda path: _draw(table, path))],
+        [
+            "Slope: least squares over 1 to 14 batches, ours and theirs. Theirs is the mean over five cameras.",
+            (
+                "A further batch costs a launch of each kernel, idle SMs at its end, queues of its own, and tiles "
+                "read back."
+            ),
+        ],
+        warnings,
+        {"batches": table},
+    )
+
+
+def _scenes() -> dict[str, str]:
+    """Scenes that are here, by the authors' name for what they stand for."""
+    found = {"Buddha": buddha(), "FairyForest": FAIRY_STAND_IN if find_scene(FAIRY_STAND_IN) else None}
+    return {name: scene for name, scene in found.items() if scene is not None}
+
+
+def _times(name: str, batches: int) -> list[dict[str, object]]:
+    scene, camera = (load_scene(name), "default") if name == FAIRY_STAND_IN else (load_buddha(name), CAMERA)
+    made = simulate(scene, "cudaraster", MACHINE, width=WIDTH, height=HEIGHT, camera=camera, batches=batches)
+    return [
+        {"stage": stage, "batches": batches, "ms": float(made.stages.loc[stage, "milliseconds"])} for stage in STAGES
+    ]
+
+
+def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Cell]:
+    """Milliseconds of a further batch, by stage."""
+    log = published(__file__, "gtx480-cuda40")
+    rows = log[(log["table"] == "figure6") & (log["scene"] == published_name) & (log["renderer"] == "CudaRaster")]
+    cells = []
+    for stage, short in STAGES.items():
+        theirs = rows[rows["column"] == f"{short}_ms"]
+        counts = theirs["key"].str.removeprefix("batches=").astype(int)
+        asked = slope(counts.to_numpy(), theirs["value"].to_numpy())
+        mine = ours[ours["stage"] == stage]
+        found = slope(mine["batches"].to_numpy(), mine["ms"].to_numpy())
+        cells.append(
+            Cell(
+                f"{published_name} ({name})",
+                f"{stage}: a further batch",
+                "us",
+                1e3 * asked,
+                1e3 * found,
+                "reported",
+                AIM,
+            )
+        )
+    return cells
+
+
+def slope(x: "np.ndarray[tuple[int], np.dtype[np.int64]]", y: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
+    """Least-squares slope of y over x."""
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def _draw(table: "pd.DataFrame", path: Path) -> None:
+    named = table.assign(line=table["scene"] + " " + table["stage"])
+    lines(
+        named,
+        path,
+        x="batches",
+        y="ms",
+        by="line",
+        title="Time of each stage over the batches of a frame, GTX 480 (model)",
+        x_label="batches",
+        y_label="time [ms]",
+    )

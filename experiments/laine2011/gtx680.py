@@ -1,0 +1,64 @@
+"""The sweep of Figure 5 on a GTX 680 beside a GTX 480: the same mixes, another machine file (a prediction)."""
+
+from typing import TYPE_CHECKING
+
+from experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
+from experiments.registry import Progress
+from experiments.result import Cell, Figure, Result
+from reports.plots import lines
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+OTHER = "gtx680"
+
+
+def run(progress: Progress) -> Result:
+    """Price the drawn areas on both machines."""
+    import pandas as pd
+
+    cells: list[Cell] = []
+    rows = []
+    for area in areas():
+        progress(f"laine2011/gtx680: {area:g} pixels a triangle")
+        made, triangles = draw(area)
+        there = made.on(OTHER)
+        old, new = nanoseconds(made, triangles), nanoseconds(there, triangles)
+        for stage in STAGES:
+            cells.append(Cell(f"{area:g} px", stage, f"ns/triangle, {OTHER}", None, new[stage], "reported"))
+            cells.append(Cell(f"{area:g} px", stage, f"{OTHER} : {MACHINE}", None, new[stage] / old[stage], "reported"))
+            bound = str(there.stages.loc[stage, "bound"])
+            rows.append(
+                {"area": area, "stage": stage, "ns": new[stage], "ratio": new[stage] / old[stage], "bound": bound}
+            )
+    table = pd.DataFrame(rows)
+    return Result(
+        "laine2011-gtx680",
+        "The sweep on a GTX 680, by the mixes of the GTX 480",
+        SOURCE,
+        cells,
+        [Figure("ratio", lambda path: _draw(table, path))],
+        [
+            (
+                "A prediction without a measured cell here: nothing is fitted to a GTX 680, and its machine file is "
+                "made of published parameters. Only the machine file differs; code compiled for 3.0 would differ too."
+            ),
+            "Stages that wait for dependent instructions have 8 SMs instead of 15, and shorter latencies on each.",
+        ],
+        tables={"sweep": table},
+    )
+
+
+def _draw(table: "pd.DataFrame", path: "Path") -> None:
+    lines(
+        table,
+        path,
+        x="area",
+        y="ratio",
+        by="stage",
+        title="Time on a GTX 680 over time on a GTX 480, synthetic sweep (model)",
+        x_label="area of a triangle [pixels]",
+        y_label="time on GTX 680 : GTX 480",
+    )

@@ -1,0 +1,80 @@
+"""Slides: memory of setup data and queues, five scenes (Laine & Karras 2011)."""
+
+from typing import TYPE_CHECKING
+
+from experiments.laine2011.generated import draw, scenes, statistics, warning
+from experiments.laine2011.sweep import SOURCE
+from experiments.published import published
+from experiments.registry import Progress
+from experiments.result import Cell, Figure, Result
+from reports.plots import paired_bars
+from simulator.stages.triangle_setup import SUBTRIANGLE_BYTES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SETUP_AIM, QUEUE_FACTOR = 0.05, 1.5
+WIDTH, HEIGHT = 1024, 768  # assumed: the slides do not say
+DERIVED = ("sanmiguel", "juarez")  # their triangle counts were taken from this very table
+QUEUES = {"bin queues": "bin_queues_MB", "tile queues": "tile_queues_MB"}
+
+
+def run(progress: Progress) -> Result:
+    """Compare the bytes of every buffer in use."""
+    table = published(__file__, "slides-memory").set_index("scene")
+    drawn = {scene.name for scene in scenes()}
+    cells: list[Cell] = []
+    for scene in statistics():
+        row = table.loc[scene.name]
+        setup = scene.triangles * SUBTRIANGLE_BYTES["1.1"] / 2**20
+        status = "fitted" if scene.name in DERIVED else "predicted"
+        cells.append(Cell(scene.name, "setup data", "MB", float(row["triangle_setup_MB"]), setup, status, SETUP_AIM))
+        if scene.name in drawn:
+            progress(f"laine2011/memory: {scene.name}")
+            used = draw(scene.name, "cudaraster", WIDTH, HEIGHT).frame.facts["memory_mb"]
+            cells += [
+                queue_cell(scene.name, queue, float(row[column]), used[queue]) for queue, column in QUEUES.items()
+            ]
+    return Result(
+        "laine2011-memory",
+        "Slides: memory in use, CudaRaster, 1024x768",
+        SOURCE,
+        cells,
+        [Figure("memory", lambda path: _draw(cells, path))],
+        [
+            "The triangles of San Miguel and Juarez were derived from their setup data, so those two cells are fitted.",
+            (
+                f"Queues: aim a factor {QUEUE_FACTOR}. The release has 16 bin streams, the slides speak of 15, one an "
+                "SM; each stream of each bin keeps an open segment of 2 KB at the end of each batch."
+            ),
+        ],
+        [warning()],
+    )
+
+
+def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:
+    """One queue; its aim is a factor, so that too little is judged like too much."""
+    aim = QUEUE_FACTOR - 1.0 if ours > asked else 1.0 - 1.0 / QUEUE_FACTOR
+    return Cell(scene, queue, "MB", asked, ours, "predicted", aim)
+
+
+def _draw(cells: list[Cell], path: "Path") -> None:
+    import pandas as pd
+
+    rows = [
+        {"cell": f"{c.row} {c.column}", "ours": c.ours, "published": c.published, "status": c.status}
+        for c in cells
+        if c.column != "setup data"
+    ]
+    table = pd.DataFrame(rows)
+    title = "Memory of the queues, generated scenes (model; published on the real ones)"
+    paired_bars(
+        table,
+        path,
+        label="cell",
+        ours="ours",
+        published="published",
+        status="status",
+        title=title,
+        y_label="memory [MB]",
+    )
