@@ -1,0 +1,55 @@
+"""``tilestamp validate``: the model beside a machine, by kernel and counter."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from experiments.commands.terminal import print_table, progress
+from experiments.validation.summary import by_kernel, fastest_tiles
+from models.errors import TilestampError
+from models.machine import load_machine
+
+
+def validate(
+    *,
+    measurements: Path | None = None,
+    machine: str = "h200",
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Print model against machine: by kernel and counter, from stored measurements, or on the GPU of this computer.
+
+    Parameters
+    ----------
+    measurements
+        Folder of measurements (micropolygon.csv with its cameras, freepipe.csv with its inputs); without it, CUDA
+        versions of our kernels run on the GPU of this computer.
+    machine
+        Machine, or machine file, that is to predict them.
+    output
+        CSV file for every compared number.
+    """
+    model = load_machine(machine)
+    with progress("validating") as say:
+        if measurements is None:
+            from experiments.validation.on_gpu import compare_here
+
+            table = compare_here(model, say)
+        else:
+            if not measurements.is_dir():
+                raise TilestampError(f"{measurements} is not a folder of measurements")
+            from experiments.validation.stored import compare
+
+            table = compare(measurements, model, say)
+    if output is not None:
+        table.to_csv(output, index=False)
+    rows = [
+        [r.kernel, str(r.spp or ""), r.quantity, str(r.cells), f"{r['mean']:.3f}", f"{r.worst:.3f}"]
+        for _, r in by_kernel(table).iterrows()
+    ]
+    print_table(f"Model against machine ({model.name})", ["kernel", "spp", "quantity", "cells", "mean", "worst"], rows, [""] * len(rows))
+    tiles = fastest_tiles(table)
+    if len(tiles):
+        right = int(((tiles.ours == tiles.measured) | ~tiles.clear).sum())
+        sys.stdout.write(f"fastest tile: right in {right} of {len(tiles)} (a difference below 10 % is no difference)\n")

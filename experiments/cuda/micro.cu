@@ -1,0 +1,158 @@
+// Micro-benchmarks for a machine description. Every kernel is small, fixed in shape, and timed from outside by events
+// or from inside by the SM's clock; Python decides sizes and repeats (experiments/validation/measuring.py).
+typedef unsigned int u32;
+typedef unsigned long long u64;
+
+// ---- one dependent chain (latency) or eight (throughput) of one operation; cycles of each block's first warp ----
+template <class F, class T, int CHAINS> static __device__ __forceinline__ void chains(F step, T seed, int n, long long* cycles, T* out) {
+  T v[CHAINS];
+  #pragma unroll
+  for (int c = 0; c < CHAINS; c++) v[c] = seed + (T)(threadIdx.x + c);
+  __syncthreads();
+  long long start = clock64();
+  for (int i = 0; i < n; i++) {
+    #pragma unroll
+    for (int u = 0; u < 4; u++) {
+      #pragma unroll
+      for (int c = 0; c < CHAINS; c++) v[c] = step(v[c]);
+    }
+  }
+  __syncthreads();
+  long long end = clock64();
+  T sum = v[0];
+  #pragma unroll
+  for (int c = 1; c < CHAINS; c++) sum += v[c];
+  out[blockIdx.x * blockDim.x + threadIdx.x] = sum;
+  if (threadIdx.x == 0) cycles[blockIdx.x] = end - start;
+}
+struct Ffma { __device__ float operator()(float x) const { asm volatile("fma.rn.f32 %0, %0, %0, %0;" : "+f"(x)); return x; } };
+struct Logic { __device__ u32 operator()(u32 x) const { asm volatile("lop3.b32 %0, %0, %0, 0x5bd1e995, 0x96;" : "+r"(x)); return x; } };
+struct Imad { __device__ u32 operator()(u32 x) const { asm volatile("mad.lo.u32 %0, %0, %0, %0;" : "+r"(x)); return x; } };
+struct Rsqrt { __device__ float operator()(float x) const { asm volatile("rsqrt.approx.f32 %0, %0;" : "+f"(x)); return x; } };
+struct Compare { __device__ u32 operator()(u32 x) const {
+  asm volatile("{.reg .pred p; setp.lt.u32 p, %0, 77; selp.u32 %0, 3, %0, p;}" : "+r"(x)); return x; } };
+#define CHAIN(NAME, F, T) \
+  extern "C" __global__ void lat_##NAME(int n, long long* c, T* o) { chains<F, T, 1>(F(), (T)3, n, c, o); } \
+  extern "C" __global__ void thr_##NAME(int n, long long* c, T* o) { chains<F, T, 8>(F(), (T)3, n, c, o); }
+CHAIN(fp32, Ffma, float)
+CHAIN(int32, Logic, u32)
+CHAIN(mul32, Imad, u32)
+CHAIN(sfu, Rsqrt, float)
+CHAIN(control, Compare, u32)
+
+// ---- latencies: pointer chases, barriers, awaited atomics ----
+extern "C" __global__ void chase_global(const u32* next, int n, long long* cycles, u32* out) {
+  u32 at = 0;
+  for (int i = 0; i < 64; i++) asm volatile("ld.global.cg.u32 %0, [%1];" : "=r"(at) : "l"(next + at));
+  long long start = clock64();
+  for (int i = 0; i < n; i++) asm volatile("ld.global.cg.u32 %0, [%1];" : "=r"(at) : "l"(next + at));
+  out[0] = at;
+  cycles[0] = clock64() - start;
+}
+extern "C" __global__ void chase_shared(int n, long long* cycles, u32* out) {
+  __shared__ u32 next[1024];
+  for (int i = threadIdx.x; i < 1024; i += blockDim.x) next[i] = (i + 33) & 1023;
+  __syncthreads();
+  u32 at = threadIdx.x;
+  long long start = clock64();
+  for (int i = 0; i < n; i++) at = ((volatile u32*)next)[at];
+  out[threadIdx.x] = at;
+  cycles[0] = clock64() - start;
+}
+extern "C" __global__ void chase_atomic(u32* counter, int n, long long* cycles, u32* out) {
+  u32 at = 0;
+  long long start = clock64();
+  for (int i = 0; i < n; i++) at = atomicAdd(counter + (at >> 31), 1u);
+  out[0] = at;
+  cycles[0] = clock64() - start;
+}
+extern "C" __global__ void barriers(int n, long long* cycles) {
+  __syncthreads();
+  long long start = clock64();
+  for (int i = 0; i < n; i++) __syncthreads();
+  if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
+}
+
+// ---- bandwidths ----
+extern "C" __global__ void read_all(const float4* a, u64 n, int rounds, float* out) {
+  float sum = 0;
+  u64 step = (u64)gridDim.x * blockDim.x;
+  for (int r = 0; r < rounds; r++)
+    for (u64 i = blockIdx.x * (u64)blockDim.x + threadIdx.x; i + 3 * step < n; i += 4 * step) {
+      float4 v[4];
+      #pragma unroll
+      for (int k = 0; k < 4; k++) asm volatile("ld.global.cg.v4.f32 {%0,%1,%2,%3}, [%4];"
+        : "=f"(v[k].x), "=f"(v[k].y), "=f"(v[k].z), "=f"(v[k].w) : "l"(a + i + k * step));
+      #pragma unroll
+      for (int k = 0; k < 4; k++) sum += v[k].x + v[k].y + v[k].z + v[k].w;
+    }
+  if (sum == 12345.678f) *out = sum;
+}
+extern "C" __global__ void scatter(u32* a, u64 mask, int rounds) {  // a 32-byte sector a lane, all over the buffer
+  u32 x = (blockIdx.x * blockDim.x + threadIdx.x) * 2654435761u + 1u;
+  for (int r = 0; r < rounds; r++) { x = x * 1664525u + 1013904223u; a[((u64)(x >> 3) * 8) & mask] = x; }
+}
+extern "C" __global__ void read_l1(const float4* a, int rounds, long long* cycles, float* out) {
+  const float4* p = a + (u64)blockIdx.x * 1024;
+  float sum = 0;
+  __syncthreads();
+  long long start = clock64();
+  for (int r = 0; r < rounds; r++)
+    #pragma unroll
+    for (int k = 0; k < 4; k++) {
+      float4 v;
+      asm volatile("ld.global.ca.v4.f32 {%0,%1,%2,%3}, [%4];" : "=f"(v.x), "=f"(v.y), "=f"(v.z), "=f"(v.w)
+        : "l"(p + ((threadIdx.x + k * 256 + r * 32) & 1023)));
+      sum += v.x + v.y + v.z + v.w;
+    }
+  __syncthreads();
+  if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
+  if (sum == 12345.678f) *out = sum;
+}
+extern "C" __global__ void banks(int stride, int rounds, long long* cycles, u32* out) {
+  __shared__ u32 words[4096];
+  for (int i = threadIdx.x; i < 4096; i += blockDim.x) words[i] = i;
+  u32 sum = 0, at = (threadIdx.x & 31) * stride;
+  __syncthreads();
+  long long start = clock64();
+  for (int r = 0; r < rounds; r++)
+    #pragma unroll
+    for (int k = 0; k < 8; k++) sum += ((volatile u32*)words)[(at + k * 32) & 4095];
+  __syncthreads();
+  if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
+  out[blockIdx.x * blockDim.x + threadIdx.x] = sum;
+}
+
+// ---- atomics: lane address = (warp * warp_words + (lane % spread) * lane_words) % words, moved on by hop words a round ----
+template <int RETURN> static __device__ __forceinline__ void pattern(u32* a, u32 spread, u32 lane_words, u32 warp_words, u32 mask, u32 hop, int rounds, u32* out) {
+  u32 t = blockIdx.x * blockDim.x + threadIdx.x, lane = threadIdx.x & 31, sum = 0;
+  u32 at = (t >> 5) * warp_words + (lane % spread) * lane_words;
+  for (int r = 0; r < rounds; r++) {
+    u32* p = a + ((at + r * hop) & mask);
+    if (RETURN) sum ^= atomicAdd(p, 1u);
+    else asm volatile("red.global.add.u32 [%0], 1;" :: "l"(p) : "memory");
+  }
+  if (RETURN) out[t] = sum;
+}
+extern "C" __global__ void atomics_awaited(u32* a, u32 s, u32 l, u32 w, u32 m, u32 h, int r, u32* o) { pattern<1>(a, s, l, w, m, h, r, o); }
+extern "C" __global__ void atomics_blind(u32* a, u32 s, u32 l, u32 w, u32 m, u32 h, int r, u32* o) { pattern<0>(a, s, l, w, m, h, r, o); }
+extern "C" __global__ void atomics_random(u32* a, u32 sectors, int awaited, int rounds, u32* out) {
+  u32 t = blockIdx.x * blockDim.x + threadIdx.x, x = t * 2654435761u + 1u, sum = 0;
+  for (int r = 0; r < rounds; r++) {
+    x = x * 1664525u + 1013904223u;
+    u32* p = a + (u64)(__umulhi(x, sectors)) * 8;
+    if (awaited) sum ^= atomicAdd(p, 1u);
+    else asm volatile("red.global.add.u32 [%0], 1;" :: "l"(p) : "memory");
+  }
+  if (awaited) out[t] = sum;
+}
+
+// ---- launches and the clock ----
+extern "C" __global__ void empty() {}
+extern "C" __global__ void burn(int n, long long* cycles, float* out) {
+  float x = threadIdx.x;
+  long long start = clock64();
+  for (int i = 0; i < n; i++) x = fmaf(x, 1.0001f, 0.5f);
+  out[blockIdx.x * blockDim.x + threadIdx.x] = x;
+  if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
+}

@@ -1,0 +1,83 @@
+"""The micropolygon back end as it was measured: bucketing and tile raster of one scene, at each tile size."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.validation.shuffle import shuffled
+from models.errors import TilestampError
+from models.simt import Simt
+from simulator.scenes import load_scene
+from simulator.stages.bound_and_split import bound_and_split
+from simulator.stages.bucket_count import bucket_count
+from simulator.stages.bucket_scan import bucket_scan
+from simulator.stages.bucket_write import bucket_write
+from simulator.stages.dice import Grids, dice
+from simulator.stages.tile_range import TILE_SIZES, screen_tiles
+from simulator.stages.tile_raster import tile_raster
+from simulator.work import Work
+
+CAMERAS = "micropolygon_cameras.json"
+SHUFFLED = "_shuffle"
+NO_BOX_TILE = 8  # the only tile size that was measured without box tests
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kernel of one scene."""
+
+    tile: int
+    spp: int
+    kernel: str  # as the measurements call it
+    work: Work
+
+
+def cameras(folder: Path) -> dict[str, Any]:
+    """Scenes of a folder of measurements, each with model, size, bound and matrix.
+
+    Raises
+    ------
+    TilestampError
+        No such file in the folder, or one that is not JSON.
+    """
+    try:
+        table: dict[str, Any] = json.loads((folder / CAMERAS).read_text("utf-8"))
+    except OSError as error:
+        raise TilestampError(f"cannot read {folder / CAMERAS}: {error.strerror}") from error
+    except json.JSONDecodeError as error:
+        raise TilestampError(f"{folder / CAMERAS} is not JSON: {error}") from error
+    return table
+
+
+def grids_of(camera: dict[str, Any], simt: Simt, *, shuffle: bool) -> Grids:
+    """Bound, split and dice the model of a camera, as the measured front end did; permuted if shuffled."""
+    patches = load_scene(camera["model"]).patches
+    if patches is None:
+        raise TilestampError(f"{camera['model']} has no patches")
+    view = (camera["model_to_clip"], camera["width"], camera["height"])
+    subpatches, _ = bound_and_split(patches.points, *view, camera["bound_pixels"], simt, counting=False)
+    grids, _ = dice(patches.points, subpatches, *view, simt, counting=False)
+    if not shuffle:
+        return grids
+    order = shuffled(len(grids.boxes))
+    return grids._replace(vertices=grids.vertices[order], boxes=grids.boxes[order])
+
+
+def back_end(grids: Grids, camera: dict[str, Any], simt: Simt) -> Iterator[Case]:
+    """Run the measured kernels at each tile size."""
+    width, height = camera["width"], camera["height"]
+    for tile in TILE_SIZES:
+        tiles = screen_tiles(width, height, tile, camera["bound_pixels"])
+        count, idx, added = bucket_count(grids.boxes, tiles, simt)
+        start, _ = bucket_scan(count, simt, counting=False)
+        lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt)
+        yield Case(tile, 0, "k_addr", added[1])
+        yield Case(tile, 0, "k_write", written[0])
+        for spp in (1, 4):
+            for box in (True, False) if tile == NO_BOX_TILE else (True,):
+                drawn = tile_raster(
+                    grids.vertices, count, start, lists, tiles, width, height, simt, spp=spp, box_tests=box
+                )[3]
+                yield Case(tile, spp, "k_raster" if box else "k_raster_nobox", drawn[0])

@@ -1,0 +1,69 @@
+"""What is compared: quantities of one kernel launch, the counters that measure them, and the aims."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from models.events import INSTRUCTION_CLASSES
+from models.events import MachineEvent as E
+from models.launch import Launch
+from models.machine import Machine
+from models.price import price
+
+SHORTEST_US = 5.0  # kernels below are measured, and not judged
+_SECTORS = "l1tex__t_sectors_pipe_lsu_mem_global_op_{}.sum"
+_REQUESTS = "l1tex__t_requests_pipe_lsu_mem_global_op_{}.sum"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One row of the report.
+
+    Parameters
+    ----------
+    name : str
+    metrics : tuple of str
+        Metrics whose sum measures it.
+    ours : callable
+        The same from a launch.
+    aim : float or None
+        Error aimed at, relative; absolute where ``absolute``.
+    """
+
+    name: str
+    metrics: tuple[str, ...]
+    ours: Callable[[Launch], float]
+    aim: float | None
+    absolute: bool = False
+
+
+def _total(*events: E) -> Callable[[Launch], float]:
+    return lambda launch: float(launch.events[:, list(events)].sum())
+
+
+def _warps(launch: Launch) -> float:
+    return float(launch.grid * -(-launch.block // 32))
+
+
+def _efficiency(launch: Launch) -> float:
+    issued = _total(*INSTRUCTION_CLASSES)(launch)
+    return _total(E.LANES)(launch) / (32.0 * issued) if issued else 0.0
+
+
+QUANTITIES = (
+    Quantity("blocks", ("launch__grid_size",), lambda launch: float(launch.grid), 0.0),
+    Quantity("warps", ("smsp__warps_launched.sum",), _warps, 0.0),
+    Quantity("atomic instructions", (_REQUESTS.format("atom"), _REQUESTS.format("red")), _total(E.ATOMIC), 0.0),
+    Quantity("instructions", ("smsp__inst_executed.sum",), _total(*INSTRUCTION_CLASSES), 0.02),
+    Quantity("SIMD efficiency", ("derived.simd_efficiency",), _efficiency, 0.02, absolute=True),
+    Quantity("load sectors", (_SECTORS.format("ld"),), _total(E.LOAD_TRANSACTIONS), 0.05),
+    Quantity("store sectors", (_SECTORS.format("st"),), _total(E.STORE_TRANSACTIONS), 0.05),
+    Quantity("atomic sectors", (_SECTORS.format("atom"), _SECTORS.format("red")), _total(E.ATOMIC_REQUESTS), 0.05),
+)
+TIME = "time"
+TIME_METRIC = "cupti_us_median"
+TIME_AIM = 0.40  # of one kernel; 0.12 on average
+
+
+def warm_microseconds(launch: Launch, machine: Machine) -> float:
+    """Time of a launch that runs again and again, as the measured ones did: its buffers are in the cache."""
+    return price([launch, launch], machine)[1].milliseconds * 1e3

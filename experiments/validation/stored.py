@@ -1,0 +1,133 @@
+"""Stored measurements: tidy CSV files, and our prediction of every kernel in them."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.validation.back_end import SHUFFLED, back_end, cameras, grids_of
+from experiments.validation.quantities import QUANTITIES, TIME, TIME_AIM, TIME_METRIC, warm_microseconds
+from models.errors import TilestampError
+from models.launch import Launch
+from models.machine import Machine
+from simulator.mix import load_mix
+from simulator.pipelines import load_pipeline
+from simulator.scenes import load_scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Say = Callable[[str], None]
+KEYS = ["scene", "W", "tile", "spp", "kernel"]
+MICROPOLYGON, FREEPIPE = "micropolygon.csv", "freepipe.csv"
+WIDEST_FREEPIPE = 1024  # pixels: wider screens take our counting minutes
+
+
+def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
+    """Predict what a folder of measurements holds.
+
+    Parameters
+    ----------
+    folder : Path
+        With micropolygon.csv and its cameras, freepipe.csv and its inputs, or one of them.
+    machine : Machine
+    say : callable
+        Told what is being done.
+
+    Returns
+    -------
+    DataFrame
+        Columns scene, W, tile, spp, kernel, quantity, ours, measured, error, aim; an error is relative, absolute for
+        SIMD efficiency.
+
+    Raises
+    ------
+    TilestampError
+        No such folder, or no measurements in it.
+    """
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    if (folder / MICROPOLYGON).is_file():
+        rows += _rows(_read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
+    if (folder / FREEPIPE).is_file():
+        rows += _rows(_read(folder / FREEPIPE), _freepipe(folder, machine, say), machine)
+    if not rows:
+        raise TilestampError(f"{folder} holds no measurements: neither {MICROPOLYGON} nor {FREEPIPE} that we can predict")
+    return pd.DataFrame(rows)
+
+
+def _read(path: Path) -> dict[tuple[Any, ...], float]:
+    """Value by scene, width, tile, samples, kernel and metric; times and cold counters only."""
+    import pandas as pd
+
+    table = pd.read_csv(path)
+    missing = {"scene", "W", "kernel", "source", "metric", "value"} - set(table.columns)
+    if missing:
+        raise TilestampError(f"{path} lacks the columns {', '.join(sorted(missing))}")
+    table = table[table.source.isin(["cupti", "ncu_cold"])]
+    for column in ("tile", "spp"):
+        if column not in table:
+            table = table.assign(**{column: 0})
+    index = [*KEYS, "metric"]
+    return dict(zip(table[index].itertuples(index=False, name=None), table.value.astype(float), strict=True))
+
+
+def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+    """Launches of every scene that has a camera, in its own order and shuffled."""
+    mix = load_mix("micropolygon", machine.compute_capability)
+    measured = {key[0] for key in _read(folder / MICROPOLYGON)}
+    for name, camera in cameras(folder).items():
+        for scene in (name, name + SHUFFLED):
+            if scene in measured:
+                say(scene)
+                grids = grids_of(camera, machine.simt, shuffle=scene != name)
+                for case in back_end(grids, camera, machine.simt):
+                    key = (scene, camera["width"], case.tile, case.spp, case.kernel)
+                    yield key, mix.launch(case.work, machine.sm.warp_size)
+
+
+def _freepipe(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+    """Launches of every scene and size whose input is there."""
+    import numpy as np
+
+    mix = load_mix("freepipe", machine.compute_capability)
+    sizes = _sizes(folder / FREEPIPE)
+    for scene, width, height in sizes:
+        source = folder / "ids" / f"{scene}_input.npz"
+        if width > WIDEST_FREEPIPE or not source.is_file():
+            continue
+        say(f"{scene} {width}x{height}")
+        for kernel in ("freepipe", "freepipe_early"):
+            frame = load_pipeline("freepipe")(
+                load_scene(str(source)), np.eye(4), width, height, machine.simt, early=kernel == "freepipe_early"
+            )
+            yield (scene, width, 0, 0, kernel), mix.launch(frame.works[0], machine.sm.warp_size)
+
+
+def _sizes(path: Path) -> list[tuple[str, int, int]]:
+    import pandas as pd
+
+    table = pd.read_csv(path)[["scene", "W", "H"]].drop_duplicates().sort_values(["W", "scene"])
+    return [(str(s), int(w), int(h)) for s, w, h in table.itertuples(index=False)]
+
+
+def _rows(
+    measured: dict[tuple[Any, ...], float], predicted: Iterator[tuple[tuple[Any, ...], Launch]], machine: Machine
+) -> Iterator[dict[str, Any]]:
+    """Ours beside measured, wherever something was measured."""
+    for key, launch in predicted:
+        about = dict(zip(KEYS, key, strict=True))
+        for quantity in QUANTITIES:
+            parts = [measured[(*key, metric)] for metric in quantity.metrics if (*key, metric) in measured]
+            if parts and (sum(parts) or quantity.aim):
+                ours, theirs = quantity.ours(launch), sum(parts)
+                error = ours - theirs if quantity.absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
+                yield about | _entry(quantity.name, ours, theirs, error, quantity.aim)
+        if (*key, TIME_METRIC) in measured:
+            theirs = measured[(*key, TIME_METRIC)]
+            ours = warm_microseconds(launch, machine)
+            yield about | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
+
+
+def _entry(quantity: str, ours: float, measured: float, error: float, aim: float | None) -> dict[str, Any]:
+    return {"quantity": quantity, "ours": ours, "measured": measured, "error": error, "aim": aim}
