@@ -80,7 +80,8 @@ def reduced_warning() -> str:
     return (
         f"NOT THE AUTHORS' MESH: {REDUCED} has a tenth of Buddha's triangles, so the counters are those of that mesh, "
         "which is also stored larger than Stanford's and was moved to where the cameras look (two published counters "
-        f"decided where); put {FULL}.ply on the scene search path (TILESTAMP_SCENES) and the same experiment compares like with like"
+        f"decided where); put {FULL}.ply on the scene search path (TILESTAMP_SCENES) and the same experiment compares "
+        "like with like"
     )
 
 
