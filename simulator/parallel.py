@@ -20,7 +20,7 @@ PARTS = 8  # a thread: even loads, and Ctrl-C is heard between parts
 
 def parts_of(items: int, smallest: int = 1) -> int:
     """How many parts to cut ``items`` into, of ``smallest`` items at least."""
-    return max(1, min(items // smallest, PARTS * get_num_threads()))
+    return max(1, min(items // smallest, PARTS * int(get_num_threads())))
 
 
 def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> None:
