@@ -5,8 +5,10 @@ import sys
 from cyclopts import App, CycloptsError
 
 from experiments.commands.catalogue import catalogue
+from experiments.commands.measure_machine import measure_machine
 from experiments.commands.render import render
 from experiments.commands.reproduce import reproduce
+from experiments.commands.validate import validate
 from models.errors import TilestampError
 
 BAD_INPUT = 2
@@ -21,6 +23,8 @@ app = App(
 app.command(render)
 app.command(reproduce)
 app.command(catalogue, name="list")
+app.command(validate)
+app.command(measure_machine)
 
 
 def main() -> None:

@@ -13,8 +13,9 @@ start     blocks / block launch rate
 launch    overhead of the kernel
 ========  ===========================================================================================================
 
-time = launch + the largest of the others; the servers of the whole chip (dram, l2, atomic, queue) stand idle until the
-first requests reach them and end before the last answer is back, so a unit's chain comes on top of theirs. It supposes that the units are many and alike; ``models.schedule`` does not.
+time = launch + the largest of the others. The servers of the whole chip (dram, l2, atomic, queue) stand idle until the
+first requests reach them and end before the last answer is back, so a unit's chain comes on top of theirs. It supposes
+that the units are many and alike; ``models.schedule`` does not.
 """
 
 import numpy as np

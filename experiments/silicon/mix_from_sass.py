@@ -102,7 +102,12 @@ def patch_prices(code: list[Instruction], event: str, chains: Price) -> dict[str
 
 def table(name: str, registers: int, prices: dict[str, Price]) -> str:
     """One kernel as TOML, an event a line."""
-    lines = [f'["{name}"]', f"registers = {registers}", 'provenance = "disassembled"', 'source = "micropolygon_sm90.sass"']
+    lines = [
+        f'["{name}"]',
+        f"registers = {registers}",
+        'provenance = "disassembled"',
+        'source = "micropolygon_sm90.sass"',
+    ]
     for event, price in prices.items():
         entries = [f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.4g}" for k, v in price.items()]
         lines.append(f"{event} = {{ {', '.join(entries)} }}")

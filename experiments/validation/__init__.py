@@ -1,1 +1,1 @@
-"""Model against machine: predictions beside counters and times, by kernel, from stored measurements or a GPU at hand."""
+"""Model against machine: predictions beside counters and times, from stored measurements or from the GPU at hand."""

@@ -28,7 +28,7 @@ def cupy() -> Any:
         raise TilestampError("this needs CuPy: install the extra with pip install 'tilestamp[gpu]'") from error
     try:
         found = module.cuda.runtime.getDeviceCount()
-    except Exception as error:  # noqa: BLE001 - CuPy raises many kinds where there is no driver
+    except Exception as error:  # CuPy raises many kinds where there is no driver
         raise TilestampError("this needs an NVIDIA GPU with its driver; none was found on this computer") from error
     if not found:
         raise TilestampError("this needs an NVIDIA GPU; the driver sees none on this computer")
@@ -39,7 +39,7 @@ def cupy() -> Any:
 def module(name: str, options: tuple[str, ...] = ()) -> Any:
     """Compile one of our CUDA sources for this GPU."""
     source = resources.files("experiments").joinpath("cuda", name).read_text("utf-8")
-    return cupy().RawModule(code=source, options=("-std=c++17", "--fmad=false", *options))
+    return cupy().RawModule(code=source, options=("-std=c++17", *options))
 
 
 def launch(name: str, grid: int, block: int, arguments: Sequence[Any], source: str = "micro.cu") -> None:
@@ -58,7 +58,7 @@ def microseconds(work: Callable[[], None], repeats: int = REPEATS) -> np.ndarray
         work()
         end.record()
         end.synchronize()
-        if repeat >= 2:  # noqa: PLR2004 - the two that warm up
+        if repeat >= 2:  # two warm up
             times.append(1e3 * cp.cuda.get_elapsed_time(start, end))
     return np.array(times)
 

@@ -21,8 +21,13 @@ def machine_file(numbers: Iterable[Number], base: Machine, name: str, descriptio
     name, description, capability : str
     """
     measured = {number.key: number for number in numbers}
-    lines = [f"# {description}", "# Written by tilestamp measure-machine; \"measured\" numbers are medians.", ""]
-    lines += ["[identity]", f'name = "{name}"', f'description = "{description}"', f'compute_capability = "{capability}"']
+    lines = [f"# {description}", '# Written by tilestamp measure-machine; "measured" numbers are medians.', ""]
+    lines += [
+        "[identity]",
+        f'name = "{name}"',
+        f'description = "{description}"',
+        f'compute_capability = "{capability}"',
+    ]
     for section, struct in SECTIONS.items():
         part = getattr(base, section)
         if section in ("identity", "fixed_function") or part is None:

@@ -81,7 +81,9 @@ def _clock() -> Number:
     grid, n = int(_attribute("MultiProcessorCount")) * 8, 1_000_000
     cycles, out = cp.zeros(grid, cp.int64), cp.zeros(grid * 256, cp.float32)
     times = microseconds(lambda: launch("burn", grid, 256, [n, cycles, out]))
-    return _number("sm.clock_mhz", float(cycles.max()) / times, "clock64 of the longest block over event time, SMs busy")
+    return _number(
+        "sm.clock_mhz", float(cycles.max()) / times, "clock64 of the longest block over event time, SMs busy"
+    )
 
 
 def _arithmetic(sms: int) -> Iterator[Number]:
@@ -131,58 +133,88 @@ def _memory(sms: int, mhz: float) -> Iterator[Number]:
     free = int(cp.cuda.runtime.memGetInfo()[0])
     large = min(2048 * MIB, free // 4 // MIB * MIB)
     buffer, out = cp.zeros(large // 4, cp.float32), cp.zeros(1, cp.float32)
+
     def read(bytes_: int, rounds: int) -> Any:
         times = microseconds(lambda: launch("read_all", sms * 4, 512, [buffer, np.uint64(bytes_ // 16), rounds, out]))
         return bytes_ * rounds / times  # bytes a microsecond: MB/s
+
     yield _number("memory.dram_gb_per_s", read(large, 1) / 1e3, f"reading {large // MIB} MiB: sustained")
     part = max(MIB, _attribute("L2CacheSize") // 4)
-    yield _number("memory.l2_bytes_per_clock", read(part, 64) / mhz, f"reading {part // MIB} MiB again and again, past L1")
+    yield _number(
+        "memory.l2_bytes_per_clock", read(part, 64) / mhz, f"reading {part // MIB} MiB again and again, past L1"
+    )
     mask = np.uint64(part // 4 - 1) if part & (part - 1) == 0 else np.uint64((1 << (part.bit_length() - 1)) // 4 - 1)
     times = microseconds(lambda: launch("scatter", sms * 8, 256, [buffer, mask, 256]))
-    yield _number("memory.l2_write_bytes_per_clock", sms * 8 * 256 * 256 * 32 / times / mhz, "stores of one word to random sectors")
+    yield _number(
+        "memory.l2_write_bytes_per_clock",
+        sms * 8 * 256 * 256 * 32 / times / mhz,
+        "stores of one word to random sectors",
+    )
     l1 = _cycles("read_l1", sms, 256, lambda c, _: [buffer, 512, c, out])
     yield _number("memory.l1_bytes_per_clock", 512 * 4 * 256 * 16 / l1, "hits in L1, 16 bytes a lane")
     for_one = _cycles("banks", sms, 1024, lambda c, o: [1, 512, c, o]) / (512 * 8 * 32)
     yield _number("memory.bank_pass_cycles", for_one, "shared loads without conflict, 32 warps")
-    lanes = [float(np.median(_cycles("banks", sms, 1024, lambda c, o, s=s: [s, 512, c, o]))) for s in (1, 2, 4, 8, 16, 32)]
-    yield Number("memory.banks", int(2 ** round(np.log2(lanes[-1] / lanes[0]))), 0.0, "slow-down at a stride of 32 words")
+    lanes = [
+        float(np.median(_cycles("banks", sms, 1024, lambda c, o, s=s: [s, 512, c, o]))) for s in (1, 2, 4, 8, 16, 32)
+    ]
+    yield Number(
+        "memory.banks", int(2 ** round(np.log2(lanes[-1] / lanes[0]))), 0.0, "slow-down at a stride of 32 words"
+    )
 
 
 def _atomics(sms: int, mhz: float) -> Iterator[Number]:
     cp = cupy()
     counters, grid, block = cp.zeros(16 * MIB, cp.uint32), sms * 8, 256
     out = cp.zeros(grid * block, cp.uint32)
+
     def rate(kernel: str, *pattern: int, rounds: int = ROUNDS) -> Any:
         arguments = [counters, *map(np.uint32, pattern), rounds, out]
         return grid * block * rounds / microseconds(lambda: launch(kernel, grid, block, arguments))
+
     everything = 16 * MIB - 1
     one = rate("atomics_blind", 1, 0, 0, everything, 0, rounds=8)
     yield _number("atomics.unit_ns_per_request", 1e3 / one, "all lanes at one address")
+
     def random(awaited: int) -> Any:
         arguments = [counters, np.uint32(1_000_000), awaited, ROUNDS, out]
         return grid * block * ROUNDS / microseconds(lambda: launch("atomics_random", grid, block, arguments))
+
     blind, awaited = random(0), random(1)
     yield _number("atomics.requests_per_clock", awaited / mhz, "a million random sectors, value used")
     yield _number("atomics.unawaited_per_clock", blind / mhz, "a million random sectors, no value")
-    yield Number("atomics.units", max(1, round(float(np.median(blind) / np.median(one)))), spread(blind), "random over one address")
-    words = [float(np.median(rate("atomics_blind", 8, s, 0, everything, 0, rounds=8))) for s in (8, 16, 32, 64, 128, 256, 512)]
+    yield Number(
+        "atomics.units",
+        max(1, round(float(np.median(blind) / np.median(one)))),
+        spread(blind),
+        "random over one address",
+    )
+    words = [
+        float(np.median(rate("atomics_blind", 8, s, 0, everything, 0, rounds=8)))
+        for s in (8, 16, 32, 64, 128, 256, 512)
+    ]
     # eight addresses a spacing apart: once each has a unit of its own, a larger spacing is no faster
     best = max(words)
     first = next(i for i, w in enumerate(words) if w > 0.7 * best)
-    yield Number("atomics.unit_bytes", 32 << first, 0.0, "eight addresses: spacing from which they no longer wait for each other")
+    yield Number(
+        "atomics.unit_bytes", 32 << first, 0.0, "eight addresses: spacing from which they no longer wait for each other"
+    )
 
 
 def _launches() -> Iterator[Number]:
     cp = cupy()
     many = 200
     kernel = lambda: launch("empty", 1, 32, [])  # noqa: E731 - one line
+
     def row() -> None:
         for _ in range(many):
             kernel()
+
     yield _number("launch.stream_us", microseconds(row) / many, f"{many} empty kernels in a stream")
+
     def waited() -> None:
         kernel()
         cp.cuda.Device().synchronize()
+
     yield _number("launch.sync_us", microseconds(waited), "an empty kernel and a wait")
     stream = cp.cuda.Stream(non_blocking=True)
     with stream:
@@ -190,11 +222,15 @@ def _launches() -> Iterator[Number]:
         row()
         graph = stream.end_capture()
         graph.upload(stream) if hasattr(graph, "upload") else None
+
         def run() -> None:
             graph.launch(stream=stream)
+
         run()
         stream.synchronize()
         graphs = microseconds(run) / many
     yield _number("launch.graph_us", graphs, f"{many} empty kernels in a graph")
     blocks = 1_000_000
-    yield _number("launch.blocks_per_us", blocks / microseconds(lambda: launch("empty", blocks, 32, [])), "a million empty blocks")
+    yield _number(
+        "launch.blocks_per_us", blocks / microseconds(lambda: launch("empty", blocks, 32, [])), "a million empty blocks"
+    )

@@ -12,14 +12,16 @@ from models.machine import Machine
 from simulator.mix import load_mix
 from simulator.pipelines import load_pipeline
 from simulator.scenes import load_scene
+from simulator.work import Work
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Say = Callable[[str], None]
 KEYS = ["scene", "W", "tile", "spp", "kernel"]
-MICROPOLYGON, FREEPIPE = "micropolygon.csv", "freepipe.csv"
-WIDEST_FREEPIPE = 1024  # pixels: wider screens take our counting minutes
+MICROPOLYGON, FREEPIPE, CUDARASTER = "micropolygon.csv", "freepipe.csv", "cudaraster.csv"
+VARIANT = "no_param_copy"  # CudaRaster without the copy of its parameters to local memory
+WIDEST = 1024  # pixels of FreePipe and CudaRaster scenes: wider screens take our counting minutes
 
 
 def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
@@ -51,8 +53,11 @@ def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
         rows += _rows(_read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
     if (folder / FREEPIPE).is_file():
         rows += _rows(_read(folder / FREEPIPE), _freepipe(folder, machine, say), machine)
+    if (folder / CUDARASTER).is_file():
+        rows += _rows(_read(folder / CUDARASTER), _cudaraster(folder, machine, say), machine)
     if not rows:
-        raise TilestampError(f"{folder} holds no measurements: neither {MICROPOLYGON} nor {FREEPIPE} that we can predict")
+        names = f"{MICROPOLYGON}, {FREEPIPE} or {CUDARASTER}"
+        raise TilestampError(f"{folder} holds no measurements that we can predict: no {names} with inputs beside it")
     return pd.DataFrame(rows)
 
 
@@ -65,6 +70,8 @@ def _read(path: Path) -> dict[tuple[Any, ...], float]:
     if missing:
         raise TilestampError(f"{path} lacks the columns {', '.join(sorted(missing))}")
     table = table[table.source.isin(["cupti", "ncu_cold"])]
+    if path.name == CUDARASTER:
+        table = table[table.variant == VARIANT]
     for column in ("tile", "spp"):
         if column not in table:
             table = table.assign(**{column: 0})
@@ -87,21 +94,38 @@ def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tu
 
 
 def _freepipe(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    """Launches of every scene and size whose input is there."""
+    """Launches of every scene and size whose input is there, blind and reading first."""
+    mix = load_mix("freepipe", machine.compute_capability)
+    for scene, source, width, height in _inputs(folder, FREEPIPE):
+        say(f"FreePipe: {scene} {width}x{height}")
+        for kernel in ("freepipe", "freepipe_early"):
+            works = _draw("freepipe", source, width, height, machine, early=kernel == "freepipe_early")
+            yield (scene, width, 0, 0, kernel), mix.launch(works[0], machine.sm.warp_size)
+
+
+def _cudaraster(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+    """Launches of the four kernels of every scene and size whose input is there."""
+    mix = load_mix("cudaraster", machine.compute_capability)
+    for scene, source, width, height in _inputs(folder, CUDARASTER):
+        say(f"CudaRaster: {scene} {width}x{height}")
+        for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
+            yield (scene, width, 0, 0, work.kernel), mix.launch(work, machine.sm.warp_size)
+
+
+def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine, **options: Any) -> list[Work]:
+    """Works of a mesh in clip space."""
     import numpy as np
 
-    mix = load_mix("freepipe", machine.compute_capability)
-    sizes = _sizes(folder / FREEPIPE)
-    for scene, width, height in sizes:
+    frame = load_pipeline(pipeline)(load_scene(str(source)), np.eye(4), width, height, machine.simt, **options)
+    return [work for work in frame.works if isinstance(work, Work)]
+
+
+def _inputs(folder: Path, name: str) -> Iterator[tuple[str, Path, int, int]]:
+    """Scenes, their inputs and sizes, without those that lack an input or are too wide."""
+    for scene, width, height in _sizes(folder / name):
         source = folder / "ids" / f"{scene}_input.npz"
-        if width > WIDEST_FREEPIPE or not source.is_file():
-            continue
-        say(f"{scene} {width}x{height}")
-        for kernel in ("freepipe", "freepipe_early"):
-            frame = load_pipeline("freepipe")(
-                load_scene(str(source)), np.eye(4), width, height, machine.simt, early=kernel == "freepipe_early"
-            )
-            yield (scene, width, 0, 0, kernel), mix.launch(frame.works[0], machine.sm.warp_size)
+        if width <= WIDEST and source.is_file():
+            yield scene, source, width, height
 
 
 def _sizes(path: Path) -> list[tuple[str, int, int]]:

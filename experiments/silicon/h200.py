@@ -1,0 +1,111 @@
+"""H200: hardware counters and times of CudaRaster, FreePipe and the micropolygon back end beside the model's."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from experiments.result import Cell, Figure, Result, Status
+from experiments.validation.quantities import SHORTEST_US, TIME
+from experiments.validation.stored import compare
+from experiments.validation.summary import by_kernel, by_scene, fastest_tiles
+from models.errors import TilestampError
+from models.machine import load_machine
+from reports.plots import paired_bars
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHARED = "TILESTAMP_SHARED"  # names the folder that has silicon/ in it
+SOURCE = "Measurements on one NVIDIA H200, CUDA 13.0: medians of 60 by CUPTI, counters by ncu"
+CONSTANTS = "teapot_512x512_bb4"  # scene whose tile raster times gave S2UR, BRANCH and pipe.control
+FITTED = {  # scenes and widths on which a mix was fitted
+    "freepipe": {"soup2k", "edges_512", "teapot16k", "nearclip5k", "bunny"},
+    "cudaraster": {"soup2k", "edges_512", "teapot16k"},
+}
+FITTED_WIDTH = 512
+CUDARASTER = {"triangleSetup", "binRaster", "coarseRaster", "fineRaster"}
+COUNTERS_FITTED = {"instructions", TIME}
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Predict every measured kernel."""
+    table = compare(folder(), load_machine("h200"), progress)
+    table["status"] = [status(*row) for row in table[["scene", "W", "kernel", "quantity"]].itertuples(index=False)]
+    predicted = table[table.status == "predicted"]
+    scenes = by_scene(predicted)
+    tiles = fastest_tiles(table)
+    clear = tiles[tiles.clear]
+    notes = [
+        f"Micropolygon mixes are read from machine code; three constants of the times are fitted, on {CONSTANTS}.",
+        f"Micropolygon mixes come from machine code; three constants of the times are fitted, on {CONSTANTS}.",
+        *_worst(predicted),
+    ]
+    tables = {"all": table, "kernels": by_kernel(predicted), "left-out-scenes": scenes, "fastest-tile": tiles}
+    return Result(
+        "silicon-h200", "H200, model against machine", SOURCE, _cells(table), _figures(table), notes, [], tables
+    )
+
+
+def folder() -> Path:
+    """Folder of measurements.
+
+    Raises
+    ------
+    TilestampError
+        Where it is not.
+    """
+    shared = Path(os.environ.get(SHARED, Path(__file__).resolve().parents[3] / "shared"))
+    found = shared / "silicon"
+    if not found.is_dir():
+        raise TilestampError(f"no measurements: set {SHARED} to the folder that has silicon/ in it")
+    return found
+
+
+def status(scene: str, width: int, kernel: str, quantity: str) -> Status:
+    """Whether a number of the model was chosen on this cell."""
+    if kernel.startswith("k_raster"):
+        return "fitted" if scene == CONSTANTS and quantity == TIME else "predicted"
+    family = "cudaraster" if kernel in CUDARASTER else kernel.removesuffix("_early")
+    fitted = scene in FITTED.get(family, set()) and width == FITTED_WIDTH and quantity in COUNTERS_FITTED
+    return "fitted" if fitted else "predicted"
+
+
+def _cells(table: "pd.DataFrame") -> list[Cell]:
+    """Times of kernels over 5 microseconds, instructions, and whatever should be exact."""
+    shown = table[table.quantity.isin(["instructions", "atomic instructions", TIME])]
+    shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]
+    cells = []
+    for r in shown.itertuples():
+        label = f"{r.scene} {r.W}" + (f" tile {r.tile}" if r.tile else "") + (f" spp {r.spp}" if r.spp else "")
+        unit = "us" if r.quantity == TIME else ""
+        cells.append(Cell(label, f"{r.kernel} {r.quantity}", unit, r.measured, r.ours, r.status, aim=r.aim))
+    return cells
+
+
+def _figures(table: "pd.DataFrame") -> list[Figure]:
+    """Times of the tile raster by tile size, a plot a scene."""
+    figures = []
+    rows = table[(table.quantity == TIME) & (table.kernel == "k_raster")]
+    for scene, group in rows.groupby("scene", sort=False):
+        bars = group.assign(label=[f"{t} px, {s} spp" for t, s in zip(group.tile, group.spp, strict=True)])
+        figures.append(Figure(f"raster-{scene}", lambda path, b=bars, s=scene: _bars(b, path, str(s))))
+    return figures
+
+
+def _bars(bars: "pd.DataFrame", path: Path, scene: str) -> None:
+    paired_bars(
+        bars, path, label="label", ours="ours", published="measured", status="status",
+        title=f"Tile raster of {scene} (H200)", y_label="us",
+    )  # fmt: skip
+
+
+def _worst(table: "pd.DataFrame") -> list[str]:
+    """Mean and worst error of the times of each kernel."""
+    rows = by_kernel(table)
+    rows = rows[rows.quantity == TIME]
+    return [
+        f"Time of {r.kernel}{f' at {r.spp} spp' if r.spp else ''}: {r.cells} predicted cells, "
+        f"mean error {100 * m:.0f} %, worst {100 * r.worst:.0f} %."
+        for r, m in zip(rows.itertuples(), rows["mean"], strict=True)
+    ]

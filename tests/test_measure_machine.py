@@ -1,0 +1,58 @@
+"""Machine files from measurements; what is said where there is no GPU."""
+
+import importlib.util
+
+import pytest
+
+from experiments.command_line import run_command
+from experiments.validation.machine_file import busy, machine_file
+from experiments.validation.measuring import Number
+from models.machine import load_machine
+
+H200 = load_machine("h200")
+NUMBERS = [
+    Number("sm.count", 100, 0.0, "driver"),
+    Number("latency.alu_cycles", 4.5, 0.01, "chain"),
+    Number("memory.dram_gb_per_s", 900.0, 0.3, "reading"),
+]
+NO_GPU = importlib.util.find_spec("cupy") is None
+
+
+@pytest.fixture
+def machine(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(machine_file(NUMBERS, H200, "mine", "My GPU, measured", "9.0"))
+    return load_machine(path)
+
+
+def test_a_measured_number_says_so_with_its_spread(machine):
+    kind, source = machine.provenance["latency.alu_cycles"]
+    assert (kind, machine.latency.alu_cycles) == ("measured", 4.5)
+    assert source == "tilestamp measure-machine: chain; spread 1.0 %"
+
+
+def test_what_was_not_measured_is_assumed_and_named(machine):
+    kind, source = machine.provenance["launch.kernel_us"]
+    assert kind == "assumed"
+    assert source == "as h200: not measured"
+
+
+def test_the_measured_bandwidth_is_the_sustained_one(machine):
+    assert machine.dram_bytes_per_cycle * machine.clock_hz == pytest.approx(900e9, rel=1e-3)
+
+
+def test_numbers_whose_repeats_disagree_tell_of_a_busy_gpu():
+    assert busy(NUMBERS) == ["memory.dram_gb_per_s"]
+
+
+@pytest.mark.skipif(not NO_GPU, reason="CuPy is installed here")
+@pytest.mark.parametrize("command", [["measure-machine", "-o", "mine.toml"], ["validate"]])
+def test_without_cupy_one_sentence_says_what_to_install(command, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert run_command(command) == 2
+    assert "pip install 'tilestamp[gpu]'" in capsys.readouterr().err
+
+
+def test_a_file_that_is_no_toml_is_refused_before_anything_runs(capsys):
+    assert run_command(["measure-machine", "-o", "mine.txt"]) == 2
+    assert "ends in .toml" in capsys.readouterr().err
