@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,7 @@ def run(progress: Callable[[str], None]) -> Result:
     clear = tiles[tiles.clear]
     notes = [
         f"Micropolygon mixes are read from machine code; three constants of the times are fitted, on {CONSTANTS}.",
-        f"Micropolygon mixes come from machine code; three constants of the times are fitted, on {CONSTANTS}.",
+        f"Fastest tile: right in {int((clear.ours == clear.measured).sum())} of {len(clear)} cases that differ by 10 %.",
         *_worst(predicted),
     ]
     tables = {"all": table, "kernels": by_kernel(predicted), "left-out-scenes": scenes, "fastest-tile": tiles}
@@ -89,11 +90,11 @@ def _figures(table: "pd.DataFrame") -> list[Figure]:
     rows = table[(table.quantity == TIME) & (table.kernel == "k_raster")]
     for scene, group in rows.groupby("scene", sort=False):
         bars = group.assign(label=[f"{t} px, {s} spp" for t, s in zip(group.tile, group.spp, strict=True)])
-        figures.append(Figure(f"raster-{scene}", lambda path, b=bars, s=scene: _bars(b, path, str(s))))
+        figures.append(Figure(f"raster-{scene}", partial(_bars, bars, str(scene))))
     return figures
 
 
-def _bars(bars: "pd.DataFrame", path: Path, scene: str) -> None:
+def _bars(bars: "pd.DataFrame", scene: str, path: Path) -> None:
     paired_bars(
         bars, path, label="label", ours="ours", published="measured", status="status",
         title=f"Tile raster of {scene} (H200)", y_label="us",

@@ -11,6 +11,7 @@ are fitted to the times of one scene, teapot_512x512_bb4 (``experiments.silicon.
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from experiments.silicon.raster_sections import Sections, raster_sections
 from experiments.silicon.sass import LATENCY, Block, Instruction, basic_blocks, classes, cycles, read_functions
@@ -44,16 +45,21 @@ def counted(blocks: list[Block], share: float = 1.0) -> Price:
     return {name: count * share for name, count in sorted(total.items())}
 
 
+def _with(price: dict[str, Any], **more: float | str) -> Price:
+    return price | more
+
+
 def raster_prices(sections: Sections, tile: int, spp: int) -> dict[str, Price]:
     """Prices of the events of the tile raster in one of its compiled variants."""
     s = sections
     warps = max(1, tile * tile // WARP)
     alone, copies = 1 / warps, 1 / spp
-    threads = {"lanes": float(min(WARP, tile * tile))}
+    threads: Price = {"lanes": float(min(WARP, tile * tile))}
     part = {name: chain(s[name], copies * alone) for name in ("BOX", "HIT", "Z")}
     grids = chain(s["QUAD"], QUADS) | {}
     grids["chain_alu"] = float(grids["chain_alu"]) + float(chain(s["GRID"])["chain_alu"])
-    quad = Counter(counted(s["QUAD"])) + Counter(counted(s["GRID"], 1 / QUADS))
+    quad: Counter[str] = Counter(counted(s["QUAD"]))  # type: ignore[arg-type]  # counts that may be fractions
+    quad += Counter(counted(s["GRID"], 1 / QUADS))  # type: ignore[arg-type]
     prices: dict[str, Price] = {
         "PIXEL_WARPS": counted(s["PIXEL"]) | chain(s["PIXEL"], alone) | {"chain_load": alone, "lanes": "PIXEL_LANES"},
         "LIST_WARPS": counted(s["LIST"]) | chain(s["LIST"], alone) | {"chain_load": alone} | threads,
@@ -61,7 +67,7 @@ def raster_prices(sections: Sections, tile: int, spp: int) -> dict[str, Price]:
         "BATCH_WARPS": counted(s["BATCH"]) | threads,
         "GATHER_WARPS": counted(s["GATHER"]) | {"lanes": "GATHER_LANES"},
         "GRIDS": grids,
-        "QUAD_WARPS": dict(quad) | {"lanes": "QUAD_LANES"},
+        "QUAD_WARPS": _with(dict(quad), lanes="QUAD_LANES"),
         "BOX_WARPS": counted(s["BOX"], copies) | part["BOX"] | {"lanes": "BOX_LANES"},
         "HIT_WARPS": counted(s["HIT"], copies) | part["HIT"] | {"lanes": "HIT_LANES"},
         "Z_WARPS": counted(s["Z"], copies) | part["Z"] | {"lanes": "Z_LANES"},

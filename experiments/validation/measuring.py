@@ -154,9 +154,11 @@ def _memory(sms: int, mhz: float) -> Iterator[Number]:
     yield _number("memory.l1_bytes_per_clock", 512 * 4 * 256 * 16 / l1, "hits in L1, 16 bytes a lane")
     for_one = _cycles("banks", sms, 1024, lambda c, o: [1, 512, c, o]) / (512 * 8 * 32)
     yield _number("memory.bank_pass_cycles", for_one, "shared loads without conflict, 32 warps")
-    lanes = [
-        float(np.median(_cycles("banks", sms, 1024, lambda c, o, s=s: [s, 512, c, o]))) for s in (1, 2, 4, 8, 16, 32)
-    ]
+
+    def conflicting(stride: int) -> float:
+        return float(np.median(_cycles("banks", sms, 1024, lambda c, o: [stride, 512, c, o])))
+
+    lanes = [conflicting(1), conflicting(32)]
     yield Number(
         "memory.banks", int(2 ** round(np.log2(lanes[-1] / lanes[0]))), 0.0, "slow-down at a stride of 32 words"
     )

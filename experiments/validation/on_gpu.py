@@ -1,6 +1,7 @@
 """Our kernels in CUDA on the GPU at hand, timed, beside the model's prediction of the same launches."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,7 +77,8 @@ def _tile(grids: Grids, tile: int, machine: Machine) -> Iterator[dict[str, Any]]
         image, _, _, drawn = tile_raster(grids.vertices, count, start, lists, tiles, WIDTH, HEIGHT, simt, spp=spp)
         pixels, depth = cp.zeros((HEIGHT, WIDTH), cp.uint32), cp.zeros((HEIGHT, WIDTH), cp.float32)
         given = (vertices, starts, cp.asarray(count), listed, *_screen(tiles), pixels, depth)
-        times = microseconds(lambda g=given, s=spp: _start("tile_raster", tile, s, tiles.total, tile * tile, *g))
+        draw = partial(_start, "tile_raster", tile, spp, tiles.total, tile * tile, *given)
+        times = microseconds(draw)
         yield _row(tile, spp, "k_raster", times, mix, drawn[0], machine)
         channels = cp.asnumpy(pixels).view(np.uint8).reshape(HEIGHT, WIDTH, 4)[:, :, :3]
         different = float((channels != image).any(axis=2).mean())
