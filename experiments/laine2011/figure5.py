@@ -18,8 +18,8 @@ from experiments.laine2011.sweep import (
 )
 from experiments.published import published
 from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from reports.plots import lines
+from experiments.result import Cell, Figure, Result, Status
+from reports.fitted_lines import fitted_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,9 +43,18 @@ def run(progress: Progress) -> Result:
         made, triangles = draw(area)
         for stage, ns in nanoseconds(made, triangles).items():
             asked = published_ns()[area, stage]
-            status = "fitted" if area in FITTED_AREAS else "predicted"
+            status: Status = "fitted" if area in FITTED_AREAS else "predicted"
             cells.append(Cell(f"{area:g} px", stage, "ns/triangle", asked, ns, status, WORST_AIM))
-            rows.append({"area": area, "stage": stage, "ns": ns, "published": asked, "bound": _bound(made, stage)})
+            rows.append(
+                {
+                    "area": area,
+                    "stage": stage,
+                    "ns": ns,
+                    "published": asked,
+                    "status": status,
+                    "bound": _bound(made, stage),
+                }
+            )
         cells += counter_cells(area, made.frame.facts["counters"], triangles)
     table = pd.DataFrame(rows)
     return Result(
@@ -121,14 +130,9 @@ def _notes() -> list[str]:
 
 
 def _draw(table: "pd.DataFrame", path: "Path") -> None:
-    lines(
-        table,
-        path,
-        x="area",
-        y="ns",
-        by="stage",
-        published="published",
-        title="Time of each stage for a triangle, synthetic sweep, GTX 480 (model and published)",
-        x_label="area of a triangle [pixels]",
-        y_label="time for a triangle [ns]",
-    )
+    import pandas as pd
+
+    measured = pd.DataFrame([{"area": area, "stage": stage, "ns": ns} for (area, stage), ns in published_ns().items()])
+    labels = ("area of a triangle [pixels]", "time for a triangle [ns]")
+    title = "Time of each stage, synthetic sweep, GTX 480"
+    fitted_lines(table, measured, path, x="area", y="ns", by="stage", title=title, labels=labels)

@@ -7,7 +7,7 @@ from experiments.laine2011.sweep import SOURCE
 from experiments.published import published
 from experiments.registry import Progress
 from experiments.result import Cell, Figure, Result
-from reports.plots import lines
+from reports.plots import paired_bars
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +42,10 @@ def run(progress: Progress) -> Result:
         "Slides: hardware (HW), CudaRaster (SW) and FreePipe (FP), depth test and colour, GTX 480",
         SOURCE,
         cells,
-        [Figure("pipelines", lambda path: _draw(table, path))],
+        [
+            Figure("pipelines", lambda path: _draw(table, PIPELINES[:2], path)),
+            Figure("freepipe", lambda path: _draw(table, PIPELINES[2:], path)),
+        ],
         [
             (
                 "Nothing is fitted to these cells. SW:HW and FP:SW are ratios of times, above 1 where the first is "
@@ -83,21 +86,16 @@ def statistic_cells(scene: "Statistics") -> list[Cell]:
     ]
 
 
-def _draw(table: "pd.DataFrame", path: "Path") -> None:
-    numbered = table.assign(number=table.groupby("pipeline").cumcount() + 1)
-    names = ", ".join(
-        f"{n} {row.scene} {row.width}"
-        for n, row in enumerate(numbered[numbered.pipeline == PIPELINES[0]].itertuples(), 1)
-    )
-    lines(
-        numbered,
+def _draw(table: "pd.DataFrame", pipelines: tuple[str, ...], path: "Path") -> None:
+    shown = table[table["pipeline"].isin(pipelines)].assign(status="predicted")
+    named = shown.assign(cell=shown["scene"] + " " + shown["width"].astype(str) + " " + shown["pipeline"])
+    paired_bars(
+        named,
         path,
-        x="number",
-        y="ms",
-        by="pipeline",
+        label="cell",
+        ours="ms",
         published="published",
-        title="Frame time on generated scenes, GTX 480 (model; published on the real ones)",
-        x_label=f"scene and width: {names}",
+        status="status",
+        title="Frame time on generated scenes, GTX 480 (published: on the real ones)",
         y_label="time of a frame [ms]",
-        log_y=True,
     )
