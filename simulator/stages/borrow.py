@@ -38,5 +38,17 @@ def _borrow(_context: Any, arrays: Any) -> Any:
 
 
 @overload(borrow)
-def _borrow_compiled(arrays):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001 - numba compares signatures
+def _borrow_compiled(arrays):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
     return lambda arrays: _borrow(arrays)  # noqa: PLW0108 - numba needs a function
+
+
+def row_of(table: Any, i: int) -> Any:
+    """Row i of a table, or None where there is no table: what compiled code cannot say without both types."""
+    return None if table is None else table[i]
+
+
+@overload(row_of)
+def _row_of(table, i):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
+    if isinstance(table, types.NoneType):
+        return lambda table, i: None  # noqa: ARG005 - numba compares signatures
+    return lambda table, i: table[i]

@@ -84,8 +84,6 @@ def clip_triangle(corners: Any, polygon: Any, spare: Any, plane: Any, steps: Any
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def polygon_component(corners: Any, polygon: Any, i: int, c: int) -> Any:
-    """Component c of the clip position of vertex i of the clipped polygon."""
-    first = corners[1, c] - corners[0, c]
-    second = corners[2, c] - corners[0, c]
-    return fma(second, polygon[i, 1], fma(first, polygon[i, 0], corners[0, c]))
+def between(a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+    """One component of a clip position at barycentrics (u, v), from those of the three corners."""
+    return fma(c - a, v, fma(b - a, u, a))

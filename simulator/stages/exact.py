@@ -36,7 +36,7 @@ def _llvm_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @overload(fma, inline="never")
-def _fma(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
+def _fma(a, b, c):  # type: ignore[no-untyped-def]
     if a == b == c == types.float32:
         return lambda a, b, c: _llvm_fma(a, b, c)  # noqa: PLW0108 - numba needs a function
     return None
@@ -56,7 +56,7 @@ def _llvm_popcount(_context: Any, bits: Any) -> Any:
 
 
 @overload(popcount)
-def _popcount(bits):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
+def _popcount(bits):  # type: ignore[no-untyped-def]
     return (lambda bits: _llvm_popcount(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 
@@ -80,7 +80,7 @@ def _true() -> Any:  # the count for zero is left undefined
 
 
 @overload(lowest_bit)
-def _lowest_bit(bits):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202 - numba compares signatures
+def _lowest_bit(bits):  # type: ignore[no-untyped-def]
     return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 

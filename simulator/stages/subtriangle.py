@@ -189,6 +189,6 @@ def store_attribute_planes(
     """Write the planes of 1/w, u/w and v/w."""
     scale = min(a.w, b.w, c.w) * BARYCENTRIC_SCALE
     w0, w1, w2 = scale * a.inverse_w, scale * b.inverse_w, scale * c.inverse_w
-    _store_plane(w0, w1, w2, a, b, c, mantissa, shift, view, planes, slot, 4)
-    _store_plane(a.u * w0, b.u * w1, c.u * w2, a, b, c, mantissa, shift, view, planes, slot, 7)
-    _store_plane(a.v * w0, b.v * w1, c.v * w2, a, b, c, mantissa, shift, view, planes, slot, 10)
+    _store_plane(w0, w1, w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(4))
+    _store_plane(a.u * w0, b.u * w1, c.u * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(7))
+    _store_plane(a.v * w0, b.v * w1, c.v * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(10))

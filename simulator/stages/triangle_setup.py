@@ -7,12 +7,13 @@ Two published releases: "1.1" (Laine & Karras 2011) has a guard band in x and y 
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.borrow import borrow
 from simulator.stages.subtriangle import View
 from simulator.stages.triangle_setup_count import (
@@ -22,6 +23,7 @@ from simulator.stages.triangle_setup_count import (
     TriangleSetupEvent,
     count_lane,
     count_warp,
+    new_counting,
 )
 from simulator.stages.triangle_setup_paths import (
     CLIPPED,
@@ -44,7 +46,7 @@ SLACK = 4096  # sub-triangle slots beyond one for each triangle, at first
 MAX_SUBTRIANGLES = 2**24
 MAX_SIZE = 2048  # pixels along an axis: 16 bins of 16 tiles of 8 pixels
 SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64 or 16
-_CHUNK_BLOCKS = 64  # blocks that one call of the worker takes
+_PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
 
 
 @njit(cache=True, nogil=True)
@@ -57,20 +59,22 @@ def _setup_range(
     simt: Simt,
     out: Setup,
     scratch: Scratch,
+    counting: Any,
     table: Any,
 ) -> None:
     """All triangles of some whole blocks; those with two or more sub-triangles are only counted here."""
-    clip, longest, lanes, read = scratch.clip, scratch.longest, scratch.lanes, scratch.read
+    clip = scratch.clip
     for warp in range(begin, end, WARP):
         last = min(warp + WARP, end)
-        allocating = 0
-        for i in range(10):
-            longest[i] = 0
+        allocating = np.int64(0)  # a literal that changes in a loop has its callees compiled twice
+        if table is not None:
+            for i in range(counting.longest.size):
+                counting.longest[i] = 0
         for t in range(warp, last):
             out.first[t] = t
             kept, fan, outcome = 0, 0, OUTSIDE
-            read[t - warp] = load_corners(positions, triangles, t, clip)
-            if read[t - warp]:
+            in_range = load_corners(positions, triangles, t, clip)
+            if in_range:
                 outcome = fast_path(clip, view, out, t, triangles)
                 kept = 1 if outcome == 0 else 0
             if outcome == CLIPPED:
@@ -78,30 +82,24 @@ def _setup_range(
                 allocating += 1 if kept >= 2 else 0
             out.subtriangles[t] = kept
             if table is not None:
-                count_lane(table, t // BLOCK, longest, outcome, kept, fan, scratch.steps)
+                counting.read[t - warp] = in_range
+                count_lane(table[warp // BLOCK], counting, outcome, kept, fan, scratch.steps)
         if table is not None:
-            count_warp(table[warp // BLOCK], allocating, read, triangles, warp, last, view, out, simt, lanes)
+            row = table[warp // BLOCK]
+            count_warp(row, allocating, counting, triangles, warp, last - warp, view, out, simt)
 
 
 @njit(cache=True, nogil=True)
-def _setup_chunk(
-    begin: int, end: int, positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any
+def _setup_part(
+    part: int, parts: int, positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any
 ) -> None:
-    """Take a chunk of the triangles, through arrays without reference counts."""
-    scratch = new_scratch()
+    """Take a share of the blocks, through arrays without reference counts."""
+    blocks = (triangles.shape[0] + BLOCK - 1) // BLOCK
+    begin, end = blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles.shape[0])
+    scratch, counting = new_scratch(), new_counting()
     positions, triangles, out, lent = borrow(positions), borrow(triangles), borrow(out), borrow(scratch)
-    if table is None:
-        _setup_range(begin, end, positions, triangles, view, simt, out, lent, None)
-    else:
-        _setup_range(begin, end, positions, triangles, view, simt, out, lent, borrow(table))
-    scratch.steps[0] = 0  # the owner lives to here
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _setup_all(positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any) -> None:
-    chunk = _CHUNK_BLOCKS * BLOCK
-    for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _setup_chunk(c * chunk, min((c + 1) * chunk, triangles.shape[0]), positions, triangles, view, simt, out, table)
+    _setup_range(begin, end, positions, triangles, view, simt, out, lent, borrow(counting), borrow(table))
+    scratch.steps[0] = counting.value[0] = 0  # the owners live to here
 
 
 @njit(cache=True, nogil=True)
@@ -228,7 +226,8 @@ def triangle_setup(
     out = _empty_setup(F, F, release)
     table = np.zeros((-(-F // BLOCK) if counting else 0, len(TriangleSetupEvent)), np.int64)
     with np.errstate(all="ignore"):
-        _setup_all(positions, triangles, view, simt, out, table if counting else None)
+        parts = parts_of(-(-F // BLOCK), _PART_BLOCKS)
+        for_parts(_setup_part, parts, positions, triangles, view, simt, out, table if counting else None)
         several = np.flatnonzero(out.subtriangles >= 2)
         counts = out.subtriangles[several].astype(np.int64)
         needed = F + int(counts.sum())

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.clipper import MAX_VERTICES, clip_triangle, polygon_component
+from simulator.stages.clipper import MAX_VERTICES, between, clip_triangle
 from simulator.stages.plane_equation import reciprocal_area
 from simulator.stages.subtriangle import (
     Corner,
@@ -47,18 +47,15 @@ class Scratch(NamedTuple):
     spare: NDArray[np.float32]
     plane: NDArray[np.float32]
     steps: NDArray[np.int64]  # (6,) vertices walked at each clip plane
-    longest: NDArray[np.int64]  # (10,) maxima over the warp
-    lanes: NDArray[np.int64]  # (32,) addresses
-    read: NDArray[np.bool_]  # (32,) triangles with indices in range
 
 
 @njit(cache=True, nogil=True)
 def new_scratch() -> Any:
     """Allocate the working memory of one worker."""
-    f32, i64 = np.float32, np.int64
+    f32 = np.float32
     return Scratch(
         np.empty((3, 4), f32), np.empty((MAX_VERTICES, 2), f32), np.empty((MAX_VERTICES, 2), f32), np.empty(3, f32),
-        np.zeros(6, i64), np.zeros(10, i64), np.empty(WARP, i64), np.zeros(WARP, np.bool_),
+        np.zeros(6, np.int64),
     )  # fmt: skip
 
 
@@ -126,9 +123,10 @@ def _store(
 
 @njit(cache=True, nogil=True)
 def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
-    x, y = polygon_component(clip, polygon, i, 0), polygon_component(clip, polygon, i, 1)
-    z, w = polygon_component(clip, polygon, i, 2), polygon_component(clip, polygon, i, 3)
-    return snap(x, y, z, w, polygon[i, 0], polygon[i, 1], view)
+    u, v = polygon[i, 0], polygon[i, 1]
+    x, y = between(clip[0, 0], clip[1, 0], clip[2, 0], u, v), between(clip[0, 1], clip[1, 1], clip[2, 1], u, v)
+    z, w = between(clip[0, 2], clip[1, 2], clip[2, 2], u, v), between(clip[0, 3], clip[1, 3], clip[2, 3], u, v)
+    return snap(x, y, z, w, u, v, view)
 
 
 @njit(cache=True, nogil=True)
@@ -137,11 +135,11 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
     kept = 0
     if n < 3:
         return kept
-    a, b = _fan_corner(clip, polygon, 0, view), _fan_corner(clip, polygon, 1, view)
-    for i in range(2, n):
+    a = b = _fan_corner(clip, polygon, np.int64(0), view)  # a literal index would be compiled by itself
+    for i in range(1, n):
         c = _fan_corner(clip, polygon, i, view)
         outcome, area = cull(a, b, c, view)
-        if outcome == 0:
+        if i >= 2 and outcome == 0:
             if slot >= 0:
                 _store(a, b, c, area, view, out, slot + kept, t, triangles)
             kept += 1
