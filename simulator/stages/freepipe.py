@@ -17,13 +17,14 @@ either: where several triangles share the least depth of a pixel, the least payl
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.atomics import CHUNK_BYTES
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts
 from simulator.stages.freepipe_events import FreePipeEvent
 from simulator.stages.freepipe_triangle import SUBPIXEL_BITS, Pieces, _fixed_depth, _start_edges, make_pieces
 from simulator.stages.freepipe_warp import WARP, FrameShape, _blocks
@@ -47,11 +48,13 @@ class FreePipeFrame(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _draw_strip(pieces, first_row, end_row, colors, frame, halves, tied):
-    """Draw all triangles to some rows of the frame, in input order.
+def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
+    """Draw all triangles to a share of the rows, in input order.
 
     ``frame`` holds the least of depth and payload; ``halves`` (None for packing "64") the two words of packing "32".
     """
+    rows = frame.shape[0]
+    first_row, end_row = rows * part // parts, rows * (part + 1) // parts
     edge = np.empty(9, np.int64)
     pixel = np.empty(3, np.int64)
     sixteen = np.float32(16)
@@ -107,18 +110,6 @@ def _keep_halves(frame, halves, tied, y, x, depth, t, colors):
     low = np.uint32((depth << np.uint64(12)) | (color & np.uint64(0xFFF)))
     halves[y, x, 0] = min(halves[y, x, 0], high)
     halves[y, x, 1] = min(halves[y, x, 1], low)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _draw(pieces, rows, strip, colors, frame, halves, tied):
-    for s in prange((rows + strip - 1) // strip):
-        _draw_strip(pieces, s * strip, min((s + 1) * strip, rows), colors, frame, halves, tied)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _count(triangles, pieces, block, shape, simt, tables, chunks):
-    for w in prange(tables.shape[0]):
-        _blocks(triangles, pieces, block, w, tables.shape[0], shape, simt, tables[w], chunks[w], None)
 
 
 def freepipe(
@@ -213,11 +204,10 @@ def _check(
 
 def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: NDArray[np.uint32]) -> FreePipeFrame:
     """Draw, in strips of rows side by side: a minimum does not ask who comes first."""
-    strip = -(-height // WORKERS)
     tied = np.zeros((height, width), np.bool_)
     if packing == "64":
         words = np.full((height, width, 1), EMPTY, np.uint64)
-        _draw(pieces, height, strip, colors, words, None, tied)
+        for_parts(_draw_strip, WORKERS, pieces, colors, words, None, tied)
         frame = words[..., 0]
         ids = (frame & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
         ids[frame == EMPTY] = -1
@@ -226,12 +216,12 @@ def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: N
         )
     wide = np.full((height, width, 2), EMPTY, np.uint64)
     halves = np.full((height, width, 2), 2**32 - 1, np.uint32)
-    _draw(pieces, height, strip, colors, wide, halves, tied)
+    for_parts(_draw_strip, WORKERS, pieces, colors, wide, halves, tied)
     drawn = wide[..., 0] != EMPTY
     mix = (halves[..., 0] & np.uint32(0xFFF)) << np.uint32(12) | halves[..., 1] & np.uint32(0xFFF)
     mixed = drawn & (mix != (wide[..., 0] & np.uint64(0xFFFFFF)))
     ids = np.where(drawn, wide[..., 1].astype(np.int64) - 1, -1).astype(np.int32)
-    return FreePipeFrame(ids, halves[..., 0] >> np.uint32(12) << np.uint32(12), mix, tied, mixed)
+    return FreePipeFrame(nearest, halves[..., 0] >> np.uint32(12) << np.uint32(12), mix, tied, mixed)
 
 
 def _make_work(
@@ -250,13 +240,11 @@ def _make_work(
     shape = FrameShape(width, 8, 1, 0) if packing == "64" else FrameShape(width, 4, 2, -(-4 * pixels // 256) * 256)
     size = shape.words * max(shape.plane_bytes, shape.word_bytes * pixels)
     workers = 1 if early else WORKERS
-    tables = np.zeros((workers, blocks, len(FreePipeEvent)), np.int64)
+    table = np.zeros((blocks, len(FreePipeEvent)), np.int64)
     chunks = np.zeros((workers, -(-size // CHUNK_BYTES)), np.int64)
-    if early:
-        _blocks(triangles, pieces, block, 0, 1, shape, simt, tables[0], chunks[0], np.full(pixels, EMPTY, np.uint64))
-    else:
-        _count(triangles, pieces, block, shape, simt, tables, chunks)
-    table, requests = tables.sum(axis=0), chunks.sum(axis=0)
+    words = np.full(pixels, EMPTY, np.uint64) if early else None
+    for_parts(_blocks, workers, triangles, pieces, block, shape, simt, table, chunks, words)
+    requests = chunks.sum(axis=0)
     E = FreePipeEvent
     served = CHUNK_BYTES * int(table[:, E.ATOMIC_REQUESTS].sum())
     streams = (

@@ -8,15 +8,17 @@ operations of the source; a compiler that contracts differently moves its last b
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.exact import fma, round_to_int32
 
 NOTHING, INSIDE, CLIPPED = 0, 1, 2  # what a thread does with its triangle
 PLANES = 6
 SUBPIXEL_BITS = 4
 MAX_POLYGON = 10
+_PART_TRIANGLES = 4096  # at least
 _F0, _F1 = np.float32(0), np.float32(1)
 
 
@@ -152,30 +154,18 @@ def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, p
     return kind, n
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _classify_all(positions, triangles, chunk, kind, count):
-    for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _classify_range(positions, triangles, c * chunk, chunk, kind, count)
-
-
 @njit(cache=True, nogil=True)
-def _classify_range(positions, triangles, first, chunk, kind, count):
+def _classify_part(part, parts, positions, triangles, kind, count):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
-    for t in range(first, min(first + chunk, triangles.shape[0])):
+    for t in range(kind.size * part // parts, kind.size * (part + 1) // parts):
         kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, polygon, spare, polygon, None)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _project_all(positions, triangles, width, height, bits, chunk, pieces):
-    for c in prange((triangles.shape[0] + chunk - 1) // chunk):
-        _project_range(positions, triangles, width, height, bits, c * chunk, chunk, pieces)
-
-
 @njit(cache=True, nogil=True)
-def _project_range(positions, triangles, width, height, bits, first, chunk, pieces):
+def _project_part(part, parts, positions, triangles, width, height, bits, pieces):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     fan = np.empty((3, 4), np.float32)
-    for t in range(first, min(first + chunk, triangles.shape[0])):
+    for t in range(pieces.kind.size * part // parts, pieces.kind.size * (part + 1) // parts):
         _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces)
 
 
@@ -217,12 +207,12 @@ def make_pieces(
     bits : int
         Sub-pixel bits of the snapped corners.
     """
-    chunk = 4096
+    parts = parts_of(len(triangles), _PART_TRIANGLES)
     kind, count = np.zeros(len(triangles), np.uint8), np.zeros(len(triangles), np.int64)
-    _classify_all(positions, triangles, chunk, kind, count)
+    for_parts(_classify_part, parts, positions, triangles, kind, count)
     first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
     total = int(first[-1])
     corner, box = np.zeros((total, 6), np.int32), np.zeros((total, 4), np.int32)
     pieces = Pieces(kind, first, corner, box, np.zeros(total, np.int8), np.zeros((total, 3), np.float32))
-    _project_all(positions, triangles, width, height, bits, chunk, pieces)
+    for_parts(_project_part, parts, positions, triangles, width, height, bits, pieces)
     return pieces

@@ -19,6 +19,7 @@ from simulator.stages.freepipe_triangle import CLIPPED, INSIDE, SUBPIXEL_BITS, _
 WARP = 32
 INDEX_BYTES = 4
 POSITION_BYTES = 16
+_SLOTS = 64  # of a hash table: twice the lanes
 
 
 class Lanes(NamedTuple):
@@ -31,7 +32,11 @@ class Lanes(NamedTuple):
     depth: NDArray[np.float32]  # (32,)
     address: NDArray[np.int64]  # (32,) of the lanes that hit, side by side
     value: NDArray[np.uint64]  # (32,)
-    rank: NDArray[np.int64]  # (32,) place of each hit among those at its address
+    row_lane: NDArray[np.int64]  # (32,) the lanes that have the row in hand, side by side ...
+    row_pixel: NDArray[np.int64]  # (32,) ... the first pixel of each one's box in it ...
+    row_columns: NDArray[np.int64]  # (32,) ... and how many there are
+    seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
+    most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
 
 
 @njit(cache=True, nogil=True)
@@ -45,6 +50,10 @@ def _new_lanes():
         np.empty(WARP, np.int64),
         np.empty(WARP, np.uint64),
         np.empty(WARP, np.int64),
+        np.empty(WARP, np.int64),
+        np.empty(WARP, np.int64),
+        np.empty((2, _SLOTS), np.int64),
+        np.empty((2, _SLOTS), np.int64),
     )
 
 
@@ -78,14 +87,17 @@ def _start_rows(pieces, lanes):
 
 
 @njit(cache=True, nogil=True)
-def _start_row(pieces, lanes, r):
+def _start_row(pieces, lanes, r, width):
     """Let the lanes that have row r begin it; returns how many those are, and the widest box among them."""
     active, widest = 0, 0
     for lane in range(WARP):
         p = lanes.piece[lane]
         if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
+            lanes.row_lane[active] = lane
+            lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
+            lanes.row_columns[active] = pieces.box[p, 1] - pieces.box[p, 0] + 1
+            widest = max(widest, lanes.row_columns[active])
             active += 1
-            widest = max(widest, int(pieces.box[p, 1] - pieces.box[p, 0] + 1))
             for k in range(3):
                 lanes.pixel[lane, k] = lanes.row[lane, k]
                 lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
@@ -95,24 +107,23 @@ def _start_row(pieces, lanes, r):
 
 
 @njit(cache=True, nogil=True)
-def _step(pieces, lanes, r, c, width, word_bytes, ids):
-    """Test pixel (c, r) of every lane's box; returns lanes that tested, and those that hit, side by side."""
+def _step(pieces, lanes, active, c, word_bytes, ids):
+    """Test the c-th pixel of the row of every lane that has one; returns those lanes, and those that hit."""
     tests, hits = 0, 0
-    for lane in range(WARP):
-        p = lanes.piece[lane]
-        if p < 0 or pieces.box[p, 2] + r > pieces.box[p, 3] or pieces.box[p, 0] + c > pieces.box[p, 1]:
+    for i in range(active):
+        if c >= lanes.row_columns[i]:
             continue
+        lane = lanes.row_lane[i]
         tests += 1
         f = lanes.pixel[lane]
         if f[0] | f[1] | f[2] >= 0:
-            pixel = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0] + c
-            lanes.address[hits] = pixel * word_bytes
+            lanes.address[hits] = (lanes.row_pixel[i] + c) * word_bytes
             if ids:
                 lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
             hits += 1
         for k in range(3):
             f[k] -= lanes.row[lane, 4 + 2 * k]
-        lanes.depth[lane] += pieces.depth[p, 1] * np.float32(16)
+        lanes.depth[lane] += pieces.depth[lanes.piece[lane], 1] * np.float32(16)
     return tests, hits
 
 
@@ -136,20 +147,31 @@ def _early(lanes, hits, t0, frame, word_bytes, simt, row):
 
 
 @njit(cache=True, nogil=True)
+def _slot(seen, most, key):
+    """Place of a key in a hash table; a new one begins with 0."""
+    i = key & (_SLOTS - 1)
+    while seen[i] != key:
+        if seen[i] < 0:
+            seen[i], most[i] = key, 0
+        else:
+            i = (i + 1) & (_SLOTS - 1)
+    return i
+
+
+@njit(cache=True, nogil=True)
 def _count_atomics(lanes, hits, shape, merge, row, chunks):
     """One instruction on each plane of the frame buffer, by the rules of ``models.atomics``.
 
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
     """
     conflicts, depth, requests = 0, 0, 0
+    for i in range(_SLOTS):
+        lanes.seen[0, i] = lanes.seen[1, i] = -1
     for i in range(hits):
-        rank, served = 1, 0
-        for j in range(i):
-            if lanes.address[j] == lanes.address[i]:
-                rank += 1
-            if lanes.address[j] // CHUNK_BYTES == lanes.address[i] // CHUNK_BYTES:
-                served = max(served, lanes.rank[j])
-        lanes.rank[i] = rank
+        pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] // shape.word_bytes)
+        chunk = _slot(lanes.seen[1], lanes.most[1], lanes.address[i] // CHUNK_BYTES)
+        rank, served = lanes.most[0, pixel] + 1, lanes.most[1, chunk]
+        lanes.most[0, pixel], lanes.most[1, chunk] = rank, max(rank, served)
         conflicts += rank > 1
         depth = max(depth, rank)
         if merge != SECTOR or rank > served:
@@ -171,13 +193,13 @@ def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
     row[FreePipeEvent.SETUP_STEPS] += 1
     row[FreePipeEvent.SETUP_LANES] += active
     for r in range(rows):
-        active, widest = _start_row(pieces, lanes, r)
+        active, widest = _start_row(pieces, lanes, r, shape.width)
         row[FreePipeEvent.ROW_STEPS] += 1
         row[FreePipeEvent.ROW_LANES] += active
         row[FreePipeEvent.WARP_STEPS] += widest
         steps += widest
         for c in range(widest):
-            tests, hits = _step(pieces, lanes, r, c, shape.width, shape.word_bytes, frame is not None)
+            tests, hits = _step(pieces, lanes, active, c, shape.word_bytes, frame is not None)
             row[FreePipeEvent.SAMPLE_TESTS] += tests
             row[FreePipeEvent.SAMPLE_HITS] += hits
             if frame is not None and hits > 0:
@@ -227,13 +249,13 @@ def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, fram
 
 
 @njit(cache=True, nogil=True)
-def _blocks(triangles, pieces, block, worker, workers, shape, simt, table, chunks, frame):
-    """Every ``workers``-th block from ``worker`` on."""
+def _blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
+    """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
     lanes = _new_lanes()
-    for b in range(worker, table.shape[0], workers):
+    for b in range(part, table.shape[0], parts):
         longest = 0
         for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
             lanes_in = min(WARP, min((b + 1) * block, triangles.shape[0]) - t0)
-            steps = _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks, frame)
+            steps = _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks[part], frame)
             longest = max(longest, steps)
         table[b, FreePipeEvent.CHAIN_STEPS] = longest

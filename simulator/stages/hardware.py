@@ -9,11 +9,12 @@ file, and the slowest sets the time. The counts here are exact for the coverage 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
+from simulator.parallel import for_parts
 from simulator.stages.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
 from simulator.work import FixedFunctionWork
 
@@ -57,8 +58,10 @@ def _quad(pieces, p, t, edge, x, y, corner, rows, bits, ids, depth, counts):
 
 
 @njit(cache=True, nogil=True)
-def _draw_strip(pieces, first_row, end_row, bits, cull, ids, depth, counts):
-    """Draw all triangles, in order, to the rows first_row (even)..end_row-1."""
+def _draw_strip(part, parts, pieces, bits, cull, ids, depth, counts):
+    """Draw all triangles, in order, to the rows of a strip, which begins at an even one."""
+    pairs = (ids.shape[0] + 1) // 2
+    first_row, end_row = 2 * (pairs * part // parts), min(2 * (pairs * (part + 1) // parts), ids.shape[0])
     edge = np.empty(9, np.int64)
     for t in range(pieces.kind.size):
         for p in range(pieces.first[t], pieces.first[t + 1]):
@@ -69,15 +72,9 @@ def _draw_strip(pieces, first_row, end_row, bits, cull, ids, depth, counts):
             for y in range(max(np.int64(box[2]) & -2, first_row), min(np.int64(box[3]) + 1, end_row), 2):
                 _start_edges(pieces.corner[p], bits, left, y, edge)
                 for x in range(left, np.int64(box[1]) + 1, 2):
-                    _quad(pieces, p, t, edge, x, y, box, end_row, bits, ids, depth, counts)
+                    _quad(pieces, p, t, edge, x, y, box, end_row, bits, ids, depth, counts[part])
                     for k in range(3):
                         edge[k] -= 2 * edge[4 + 2 * k]
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _draw(pieces, strip, bits, cull, ids, depth, counts):
-    for s in prange(counts.shape[0]):
-        _draw_strip(pieces, s * strip, min((s + 1) * strip, ids.shape[0]), bits, cull, ids, depth, counts[s])
 
 
 def hardware(
@@ -126,9 +123,8 @@ def hardware(
         raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     pieces = make_pieces(positions, triangles, width, height, bits)
     ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.uint32)
-    strip = -(-height // (2 * STRIPS)) * 2
-    counts = np.zeros((-(-height // strip), 3), np.int64)
-    _draw(pieces, strip, bits, cull_backfaces, ids, depth, counts)
+    counts = np.zeros((STRIPS, 3), np.int64)
+    for_parts(_draw_strip, STRIPS, pieces, bits, cull_backfaces, ids, depth, counts)
     quads, tests, writes = (int(n) for n in counts.sum(axis=0))
     work, rasterized = _work(positions, triangles, pieces, cull_backfaces, quads, tests, writes)
     facts = {"rasterized": rasterized, "quad_efficiency": tests / max(4 * quads, 1)}
