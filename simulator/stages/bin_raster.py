@@ -12,15 +12,17 @@ Which block draws which batch is decided by the machine; here batch b goes to bl
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, parallel_chunksize, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.bin_raster_batch import BIN_SEGMENT, BLOCK, ENTRY_BYTES, BinInput, _play_batch
 from simulator.stages.bin_raster_cover import HEADER_BYTES, transaction_bytes
 from simulator.stages.bin_raster_events import BinRasterEvent
+from simulator.stages.borrow import row_of
 from simulator.work import Work
 
 RELEASES = ("1.1", "nvdiffrast")
@@ -45,18 +47,11 @@ class BinQueues(NamedTuple):
     bins_y: int
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _count_batches(given, batch, counts, events):
-    """Count each batch's entries by bin, and its events, into its own rows."""
-    for b in prange(counts.shape[0]):
-        _play_batch(given, b, batch, counts[b], None, events[b])
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _fill_batches(given, batch, counts, entries):
-    """Write each batch's entries from the places in its row of ``counts``; only count where ``entries`` is None."""
-    for b in prange(counts.shape[0]):
-        _play_batch(given, b, batch, counts[b], entries, None)
+@njit(cache=True, nogil=True)
+def _play_part(part, parts, given, batch, counts, entries, events):
+    """Play a share of the batches, each with its own rows: see ``_play_batch``."""
+    for b in range(counts.shape[0] * part // parts, counts.shape[0] * (part + 1) // parts):
+        _play_batch(given, b, batch, counts[b], entries, row_of(events, b))
 
 
 def bin_raster(
@@ -111,15 +106,11 @@ def bin_raster(
     batches = -(-triangles // batch)
     counts = np.zeros((batches, bins_x * bins_y), np.int64)
     events = np.zeros((batches, len(BinRasterEvent)), np.int64) if counting else None
-    with parallel_chunksize(1):
-        if events is None:
-            _fill_batches(given, batch, counts, None)
-        else:
-            _count_batches(given, batch, counts, events)
-        starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))])
-        cursors = starts[:-1] + np.cumsum(counts, axis=0) - counts
-        entries = np.empty(starts[-1], np.int32)
-        _fill_batches(given, batch, cursors, entries)
+    for_parts(_play_part, parts_of(batches), given, batch, counts, None, events)
+    starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))])
+    cursors = starts[:-1] + np.cumsum(counts, axis=0) - counts
+    entries = np.empty(starts[-1], np.int32)
+    for_parts(_play_part, parts_of(batches), given, batch, cursors, entries, None)
     queues = BinQueues(starts, entries, counts, _stream_totals(counts), bins_x, bins_y)
     segments = int((-(-counts // BIN_SEGMENT)).sum())
     work = _work(events, setup, len(entries), segments, segment_bytes)

@@ -233,7 +233,7 @@ def _play_batch(given, b, batch, counts, entries, events):
     """
     first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
     scratch, boxes = _new_scratch(counts.size, events is not None), _new_boxes()
-    read, write = 0, 0
+    read = write = np.int64(0)  # literals that change in a loop have their callees compiled twice
     while True:
         while write - read < BLOCK and first < end:
             first, write = _read_step(given, scratch.ring, read, write, first, end, events)

@@ -11,13 +11,15 @@ bins complete in the order in which they are drawn. No picture depends on it.
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, parallel_chunksize, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts
 from simulator.stages.bin_raster import STREAMS, BinQueues, check_viewport
 from simulator.stages.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
+from simulator.stages.borrow import row_of
 from simulator.stages.coarse_raster_bin import (
     BIN_TILES,
     BLOCK,
@@ -49,18 +51,10 @@ class TileQueues(NamedTuple):
     tiles_y: int
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _count_bins(given, order, counts, events):
-    """Count each bin's emits by tile, and its events, into its own rows."""
-    for i in prange(order.size):
-        _play_bin(given, order[i], counts[order[i]], None, events[i])
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _fill_bins(given, order, counts, entries):
-    """Write each bin's emits from the places in its row of ``counts``; only count them where ``entries`` is None."""
-    for i in prange(order.size):
-        _play_bin(given, order[i], counts[order[i]], entries, None)
+@njit(cache=True, nogil=True)
+def _play_part(part, _parts, given, order, counts, entries, events):
+    """Play one bin, with its own rows: see ``_play_bin``."""
+    _play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
 
 
 def coarse_raster(
@@ -118,16 +112,12 @@ def coarse_raster(
     events = np.zeros((len(order), len(CoarseRasterEvent)), np.int64) if counting else None
     bin_tiles = _bin_tiles(given, bins)
     in_frame = bin_tiles >= 0
-    with parallel_chunksize(1):
-        if events is None:
-            _fill_bins(given, order, counts, None)
-        else:
-            _count_bins(given, order, counts, events)
-        starts = np.zeros(given.tiles_x * given.tiles_y + 1, np.int64)
-        starts[bin_tiles[in_frame] + 1] = counts[in_frame]
-        np.cumsum(starts, out=starts)
-        entries = np.empty(starts[-1], np.int32)
-        _fill_bins(given, order, np.where(in_frame, starts[bin_tiles], 0), entries)
+    for_parts(_play_part, len(order), given, order, counts, None, events)
+    starts = np.zeros(given.tiles_x * given.tiles_y + 1, np.int64)
+    starts[bin_tiles[in_frame] + 1] = counts[in_frame]
+    np.cumsum(starts, out=starts)
+    entries = np.empty(starts[-1], np.int32)
+    for_parts(_play_part, len(order), given, order, np.where(in_frame, starts[bin_tiles], 0), entries, None)
     used = in_frame[order] & (deferred_clear | (counts[order] > 0))
     active = bin_tiles[order][used].astype(np.int32)
     segments = int((-(-counts // TILE_SEGMENT)).sum())
