@@ -103,7 +103,10 @@ def patch_prices(code: list[Instruction], event: str, chains: Price) -> dict[str
     share = 1 / len(bodies) if event == "ATOMIC" else 1 / 9 if event == "WRITE_WARPS" else 1.0
     slot = counted(bodies, share) | {"lanes": "SLOT_LANES" if event == "ATOMIC" else event.replace("WARPS", "LANES")}
     slot.pop("atomic", None)  # the event ATOMIC passes through
-    return {"PATCH_WARPS": patch | {"lanes": "PATCH_LANES"}, event: slot}
+    prices: dict[str, Price] = {"PATCH_WARPS": patch | {"lanes": "PATCH_LANES"}, event: slot}
+    if event == "ATOMIC":  # lanes that skip a body wait at its end, in an instruction of their own
+        prices["DIVERGENT_WARPS"] = {"control": 1.0, "lanes": 0.0}
+    return prices
 
 
 def table(name: str, registers: int, prices: dict[str, Price]) -> str:
