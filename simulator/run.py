@@ -55,11 +55,11 @@ class Run:
         """One for each kernel launch, in machine events."""
         if not any(isinstance(work, Work) for work in self.frame.works):  # fixed function alone needs no mix
             return [work.launch() for work in self.frame.works if isinstance(work, FixedFunctionWork)]
-        mix = load_mix(self.pipeline, self.machine.compute_capability)
-        return [
-            mix.launch(work, self.machine.sm.warp_size) if isinstance(work, Work) else work.launch()
-            for work in self.frame.works
-        ]
+        return [self._launch(work) if isinstance(work, Work) else work.launch() for work in self.frame.works]
+
+    def _launch(self, work: Work) -> Launch:
+        """Price events in instructions; a pipeline that is fixed function throughout has no mix."""
+        return load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
 
     @cached_property
     def timings(self) -> list[Timing]:

@@ -67,6 +67,8 @@ def test_list_says_what_each_thing_is(kind, capsys):
         (["render", "teapot", *SMALL, "--spp", "3"], "3"),
         (["render", "teapot", *SMALL, "--tile", "32"], "512 threads"),
         (["render", "teapot", *SMALL, "--msaa", "4"], "msaa"),
+        (["render", "no-such-folder/model.obj"], "no-such-folder/model.obj"),
+        (["render", "teapot", *SMALL, "-O", "texture=3"], "texture"),
         (["render", "teapot", *SMALL, "--set", "sm.cout=3"], "sm.cout"),
         (["render", "teapot", *SMALL, "-o", "nowhere/out.png"], "nowhere"),
         (["render", "teapot", *SMALL, "-o", "out.gif"], ".png"),
@@ -94,3 +96,22 @@ def test_an_interrupt_is_one_sentence_and_exit_code_130(capsys, monkeypatch):
     monkeypatch.setattr("simulator.simulation.simulate", interrupted)
     assert run_command(["render", "teapot", *SMALL]) == 130
     assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_pipeline_that_is_fixed_function_throughout_needs_no_mix(capsys):
+    assert run_command(["render", "spot", *SMALL, "--pipeline", "hardware", "--machine", "gtx480", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["stages"]["hardware"]["milliseconds"] > 0
+
+
+def test_an_output_that_is_a_folder_is_refused_before_anything_is_drawn(tmp_path, capsys):
+    (tmp_path / "out.png").mkdir()
+    assert run_command(["render", "teapot", *SMALL, "-o", str(tmp_path / "out.png")]) == BAD_INPUT
+    assert "is a folder" in capsys.readouterr().err
+
+
+def test_a_map_that_the_pipeline_does_not_draw_leaves_no_picture_behind(tmp_path, capsys):
+    output = ["-o", str(tmp_path / "out.png"), "--map", "quads"]
+    assert run_command(["render", "teapot", *SMALL, "--pipeline", "stamps", *output]) == BAD_INPUT
+    assert "no map of quads" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

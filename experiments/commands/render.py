@@ -3,6 +3,7 @@
 import ast
 import json
 import math
+import os
 import re
 import sys
 from pathlib import Path
@@ -105,10 +106,10 @@ def render(
         run = _simulate(scene, pipeline, machine, set_, (width, height), camera, fidelity, options)
         say("pricing")
         stages = run.stages
-    if output is not None:
-        write_png(run.image, output)
     if map_ is not None and output is not None:
         write_map(run, map_, output.with_suffix(f".{map_}.png"))
+    if output is not None:
+        write_png(run.image, output)
     if json_:
         sys.stdout.write(json.dumps(as_json(run)) + "\n")
     else:
@@ -166,6 +167,10 @@ def _check_output(output: Path | None, map_: str | None) -> None:
         raise TilestampError(f"-o {output}: pictures are written as .png")
     if not output.parent.is_dir():
         raise TilestampError(f"-o {output}: there is no folder {output.parent}")
+    if output.is_dir():
+        raise TilestampError(f"-o {output}: is a folder")
+    if not os.access(output.parent, os.W_OK):
+        raise TilestampError(f"-o {output}: the folder {output.parent} cannot be written to")
 
 
 def write_png(image: Any, path: Path) -> None:
@@ -173,8 +178,13 @@ def write_png(image: Any, path: Path) -> None:
     from PIL import Image
 
     partial = path.with_suffix(".partial")
-    Image.fromarray(image).save(partial, format="png")
-    partial.replace(path)
+    try:
+        Image.fromarray(image).save(partial, format="png")
+        partial.replace(path)
+    except OSError as error:
+        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def write_map(run: Run, name: str, path: Path) -> None:

@@ -36,11 +36,13 @@ class Progress:
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], styles: Sequence[str] = ()) -> None:
     """Print a table on standard output: first column left, the others right."""
-    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False)
+    table = Table(header_style="bold", box=None, pad_edge=False)
     for index, column in enumerate(columns):
         table.add_column(column, justify="left" if index == 0 else "right", no_wrap=True)
     for index, row in enumerate(rows):
         table.add_row(*row, style=styles[index] if index < len(styles) else None)
     console = Console()
     width = None if console.is_terminal else 240
-    Console(width=width).print(table)
+    wide = Console(width=width)
+    wide.print(title, style="italic", markup=False, soft_wrap=True)
+    wide.print(table)

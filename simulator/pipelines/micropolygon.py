@@ -85,6 +85,8 @@ def micropolygon(
     """
     if scene.patches is None:
         raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
+    if texture is not None and not isinstance(texture, np.ndarray):
+        raise TilestampError(f"texture must be an array of (H, W, 3 or 4) bytes, not {texture!r}")
     points = scene.patches.points
     tiles = screen_tiles(width, height, tile, bound)
     subpatches, split = bound_and_split(

@@ -148,6 +148,8 @@ def _resolve(source: str | Path, scene_path: SearchPath) -> Path:
         return path
     found = find_scene(str(source), scene_path)
     if found is None:
+        if path.parent != Path():
+            raise TilestampError(f"there is no scene file {path}")
         known = [name for name, _ in list_scenes(scene_path) if name not in NOT_SHIPPED or find_scene(name, scene_path)]
         raise missing_scene(str(source), known, scene_path)
     return found
@@ -167,8 +169,6 @@ def _read(name: str, path: Path, kind: Kind) -> Scene:
         scene = clip_space_scene(read_clip_space(path), name)
     elif suffix in GLTF_SUFFIXES:
         scene = Scene(name, mesh=checked_mesh(read_gltf(path), path))
-    elif suffix in (".glb", ".gltf"):
-        scene = Scene(name, mesh=read_gltf(path))
     else:
         scene = Scene(name, mesh=read_mesh(path))
     return replace(with_mesh(scene), patches=None) if kind == "mesh" else scene
