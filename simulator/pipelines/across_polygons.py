@@ -1,6 +1,5 @@
 """Across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009, without blur)."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -28,7 +27,6 @@ def across_polygons(
     positions: str | None = None,
     edge: float = 1.0,
     triangles: bool = False,
-    maps: Sequence[str] = (),  # noqa: ARG001 - the map of tests comes for nothing
 ) -> Frame:
     """Micropolygons in parallel: a lane each, warps as long as their longest lane.
 

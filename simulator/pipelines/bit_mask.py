@@ -1,6 +1,5 @@
 """Bit mask: samples that a patch has hit are not tested again by its later micropolygons (Yao et al. 2012)."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,6 @@ def bit_mask(
     positions: str | None = None,
     edge: float = 1.0,
     triangles: bool = False,
-    maps: Sequence[str] = (),  # noqa: ARG001 - the maps come for nothing
 ) -> Frame:
     """Micropolygons under a bit mask a patch: samples already hit are filtered.
 

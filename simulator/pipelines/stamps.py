@@ -1,6 +1,5 @@
 """Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009)."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ def stamps(
     positions: str | None = None,
     edge: float = 1.0,
     triangles: bool = False,
-    maps: Sequence[str] = (),  # noqa: ARG001 - the map of tests comes for nothing
 ) -> Frame:
     """Micropolygons by stamps: n x n pixels tested at once, one level or two.
 
