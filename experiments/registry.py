@@ -1,4 +1,7 @@
-"""Experiments by name: a module in a paper's folder that has a function ``run`` is one (``eisenacher2010/table1``)."""
+"""Experiments by name: a module in a paper's folder that has a function ``run`` is one (``eisenacher2010/table1``).
+
+A module that says ``SLOW = True`` runs only when it is named, or when all are asked for.
+"""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -29,8 +32,19 @@ def load_experiment(name: str) -> Experiment:
     return experiment
 
 
-def select(names: tuple[str, ...]) -> list[str]:
-    """Experiments for what a user names: ``paper/table``, a paper, or a table; all if nothing is named.
+def is_slow(name: str) -> bool:
+    """Whether an experiment is left out where nothing is named."""
+    return "\nSLOW = True" in (FOLDER / f"{name}.py").read_text(encoding="utf-8")
+
+
+def select(names: tuple[str, ...], *, everything: bool = False) -> list[str]:
+    """Experiments for what a user names: ``paper/table``, a paper, or a table; the quick ones if nothing is named.
+
+    Parameters
+    ----------
+    names : tuple of str
+    everything : bool
+        All of them, the slow ones too.
 
     Raises
     ------
@@ -44,7 +58,9 @@ def select(names: tuple[str, ...]) -> list[str]:
         if not fits:
             raise TilestampError(f"no experiment is called {name}; there are {', '.join(known)}")
         chosen += fits
-    return list(dict.fromkeys(chosen)) or known
+    if chosen:
+        return list(dict.fromkeys(chosen))
+    return [name for name in known if everything or not is_slow(name)]
 
 
 def _module(name: str) -> str:

@@ -18,7 +18,7 @@ COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim
 
 
 def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
-    """Write one result into ``folder/NAME``, all of it or nothing.
+    """Write one result into a folder of its own in ``folder``, all of it or nothing.
 
     Returns
     -------
@@ -28,9 +28,9 @@ def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
     import pandas as pd
 
     folder.mkdir(parents=True, exist_ok=True)
-    target = folder / result.name
+    target = folder / result_folder(result)
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        made = Path(scratch) / result.name
+        made = Path(scratch) / target.name
         made.mkdir()
         pd.DataFrame([_record(cell) for cell in result.cells], columns=list(COLUMNS)).to_csv(
             made / "cells.csv", index=False
@@ -43,6 +43,11 @@ def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)
     return target
+
+
+def result_folder(result: Result) -> str:
+    """Name of the folder of a result."""
+    return result.name.replace("/", "-")
 
 
 def _record(cell: Cell) -> dict[str, Any]:
@@ -90,7 +95,7 @@ def _section(result: Result) -> dict[str, Any]:
             {"cells": cell_texts(cell), "marks": f"{cell.status} {'missed' if cell.missed else ''}"}
             for cell in result.cells
         ],
-        "figures": [f"{result.name}/{figure.name}.png" for figure in result.figures],
+        "figures": [f"{result_folder(result)}/{figure.name}.png" for figure in result.figures],
     }
 
 

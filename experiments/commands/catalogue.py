@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from experiments.registry import describe, experiment_names
+from experiments.registry import describe, experiment_names, is_slow
 from models.machine import list_machines
 from simulator.pipelines import load_pipeline, pipeline_names
 from simulator.scenes import list_scenes
@@ -40,5 +40,5 @@ def entries(kind: Kind) -> dict[str, str]:
     if kind == "machines":
         return dict(list_machines())
     if kind == "experiments":
-        return {name: describe(name) for name in experiment_names()}
+        return {name: describe(name) + (" [slow]" if is_slow(name) else "") for name in experiment_names()}
     return {name: (load_pipeline(name).__doc__ or "").strip().splitlines()[0] for name in pipeline_names()}

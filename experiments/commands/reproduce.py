@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from experiments.commands.terminal import print_table, progress
-from experiments.registry import load_experiment, select
+from experiments.registry import experiment_names, load_experiment, select
 from experiments.result import Result
 from experiments.write import COLUMNS, cell_texts, write_index, write_result
 
@@ -17,6 +17,7 @@ RESULTS = Path("reports") / "results"
 
 def reproduce(
     *names: str,
+    all_: Annotated[bool, Parameter(name="--all", negative="")] = False,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
@@ -25,14 +26,16 @@ def reproduce(
     Parameters
     ----------
     names
-        Experiments (`tilestamp list experiments`), papers, or tables; all of them if none is given.
+        Experiments (`tilestamp list experiments`), papers, or tables; those that are quick if none is given.
+    all_
+        Run the slow ones too.
     output
         Folder for the results.
     json_
         Print one JSON object instead of tables.
     """
     results: list[Result] = []
-    chosen = select(names)
+    chosen = select(names, everything=all_)
     with progress("reproducing") as say:
         for number, name in enumerate(chosen, 1):
             say(f"{name} ({number} of {len(chosen)})")
@@ -46,7 +49,14 @@ def reproduce(
         return
     for result in results:
         _print_result(result)
+    _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
+
+
+def _print_end(output: Path, page: Path, left: set[str]) -> None:
+    """Say where everything is, and what was left out for its time."""
     sys.stdout.write(f"\nCSV, manifests and plots: {output}; the page: {page}\n")
+    if left:
+        sys.stdout.write(f"Not run, for their time (name them, or --all): {', '.join(sorted(left))}\n")
 
 
 def _print_result(result: Result) -> None:

@@ -6,6 +6,8 @@ from typing import Any
 from experiments.result import Cell, Result
 from experiments.ru2016.setting import SOURCE, draw, missing, published
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 OPTIONS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "bilinear_vs_nearest": ({"texture_filter": "bilinear"}, {"texture_filter": "nearest"}),
     "ssao": ({"ssao": True}, {"ssao": False}),

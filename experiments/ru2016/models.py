@@ -9,6 +9,8 @@ from experiments.result import Cell, Figure, Result, Status
 from experiments.ru2016.setting import SOURCE, draw, missing, published
 from reports.plots import paired_bars
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "tile_ms": ("tiled", {"capacity": "original"}),
     "tile_without_culling_ms": ("tiled", {"capacity": "original", "cull_backfaces": False}),

@@ -10,6 +10,8 @@ from models.machine import load_machine
 from models.occupancy import residency
 from reports.plots import paired_bars
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 REGISTERS = 63  # published
 MODEL = "2CylinderEngine"
 FITTED_TILE = 8  # the launches of 115 draws are one number, fitted on this cell: here the engine is one draw

@@ -25,6 +25,8 @@ from simulator.stages.sample_positions import sample_positions
 from simulator.stages.stamps import stamp_shape, stamps
 from simulator.work import Work
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 MACHINES = ("gtx280", "gtx480", "h200")
 AREAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0)
 GRID = 16  # squares along a patch

@@ -20,6 +20,8 @@ from simulator.stages.sample_positions import sample_positions
 from simulator.stages.stamps import stamp_shape
 from simulator.stages.stamps_count import count_tests
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 ASPECTS = (1, 2, 4, 8, 16, 32)
 AREAS = (0.25, 1.0, 4.0)  # pixels
 PATCH = 64.0  # pixels a side

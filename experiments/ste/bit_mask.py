@@ -24,6 +24,8 @@ from simulator.stages.sample_positions import sample_positions
 from simulator.stages.stamps import stamp_shape
 from simulator.stages.stamps_count import count_tests
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 HEIGHTS = (96, 192, 384, 768)  # windows of 4:3
 LEVELS = {"bigguy": (2, 3, 4), "cube": (5, 6, 7)}
 PAPER_STE = 3.0  # % and less, bigguy without the mask

@@ -28,6 +28,8 @@ from simulator.stages.motion_interleaved import motion_interleaved
 from simulator.stages.motion_interval import motion_brute_force, motion_interval
 from simulator.work import Work
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 WAYS = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # pixels moved while the shutter is open
 RADII = (0.0, 2.0)  # circle of confusion, pixels
 SPP = 16

@@ -18,6 +18,8 @@ from simulator.stages.sample_positions import sample_positions
 from simulator.stages.stamps import stamp_shape
 from simulator.stages.stamps_count import count_tests
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 AREAS = (0.25, 0.5, 1.0, 2.0, 4.0, 10.0)
 STAMPS = (1, 2, 4, 8)
 BATCHES = 40

@@ -20,6 +20,8 @@ from simulator.stages.sample_positions import sample_positions
 from simulator.stages.stamps import stamp_shape
 from simulator.stages.stamps_count import count_tests
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 SCENES = ("teapot", "bigguy", "killeroo")
 SIZE = (1600, 1200)
 BOUNDS = (8.0, 4.0)  # pixels: sub-patches are split down to these boxes

@@ -9,6 +9,8 @@ from experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, pu
 from models.launch_graph import Node, as_graph, on_stream
 from models.machine import Machine, load_machine
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 MACHINE = "ga104"
 PIXELS = WIDTH * HEIGHT
 TRIANGLES = 4968

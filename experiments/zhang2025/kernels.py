@@ -14,6 +14,8 @@ from reports.plots import paired_bars
 from simulator.run import Run
 from simulator.stages.zhang2025.primitive_compaction import most_triangles
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 AIM = 0.5
 MEMORY_BOUND = 75.0  # percent of the peak
 

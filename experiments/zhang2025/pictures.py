@@ -16,6 +16,8 @@ from simulator.pipelines import load_pipeline
 from simulator.scenes.camera import LookAt
 from simulator.scenes.library import load_scene
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 SCENE = "CesiumMilkTruck"
 SIZE = 512  # pixels
 CAMERA = LookAt((3.2, 2.2, 4.2), (0.0, 1.2, 0.0), fov_degrees=45.0)

@@ -13,6 +13,8 @@ from simulator.pipelines.binned import binned
 from simulator.scenes.scene import Mesh, Scene
 from simulator.work import Work
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 MACHINE = "ga104"
 SIZE = 512  # pixels and texels on a side
 MINIFICATIONS = (0.5, 1.0, 2.0, 4.0, 8.0)  # texels a pixel
