@@ -69,8 +69,8 @@ def paired_bars(
             if kind == "fitted":
                 bar.set(facecolor="white", edgecolor=PALETTE[0], hatch="////")
         axes.plot(positions, table[published], **PUBLISHED, label="published")
-        axes.bar([], [], color=PALETTE[0], label="predicted")
-        axes.bar([], [], facecolor="white", edgecolor=PALETTE[0], hatch="////", label="fitted")
+        axes.bar(0, 0, color=PALETTE[0], label="predicted")
+        axes.bar(0, 0, facecolor="white", edgecolor=PALETTE[0], hatch="////", label="fitted")
         axes.set_xticks(list(positions), table[label], rotation=45, ha="right", fontsize=8)
         axes.set(ylabel=y_label)
         axes.legend()
