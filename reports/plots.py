@@ -68,12 +68,11 @@ def paired_bars(
         for bar, kind in zip(bars, table[status], strict=True):
             if kind == "fitted":
                 bar.set(facecolor="white", edgecolor=PALETTE[0], hatch="////")
-        axes.plot(positions, table[published], **PUBLISHED, label="published")
-        axes.bar(0, 0, color=PALETTE[0], label="predicted")
-        axes.bar(0, 0, facecolor="white", edgecolor=PALETTE[0], hatch="////", label="fitted")
+        (points,) = axes.plot(positions, table[published], **PUBLISHED)
+        kinds = {"published": points} | dict(zip(table[status], bars, strict=True))
         axes.set_xticks(list(positions), table[label], rotation=45, ha="right", fontsize=8)
         axes.set(ylabel=y_label)
-        axes.legend()
+        axes.legend(kinds.values(), kinds.keys())
 
 
 def stacked_bars(table: "pd.DataFrame", path: Path, *, title: str, y_label: str) -> None:
@@ -85,5 +84,6 @@ def stacked_bars(table: "pd.DataFrame", path: Path, *, title: str, y_label: str)
             axes.bar(range(len(table)), heights, bottom=base, color=color, label=str(column), width=0.62)
             base = [low + high for low, high in zip(base, heights, strict=True)]
         axes.set_xticks(range(len(table)), [str(name) for name in table.index], rotation=30, ha="right")
+        axes.margins(y=0.08)
         axes.set(ylabel=y_label)
         axes.legend(fontsize=8)
