@@ -48,7 +48,12 @@ def validate(
         [r.kernel, str(r.spp or ""), r.quantity, str(r.cells), f"{r['mean']:.3f}", f"{r.worst:.3f}"]
         for _, r in by_kernel(table).iterrows()
     ]
-    print_table(f"Model against machine ({model.name})", ["kernel", "spp", "quantity", "cells", "mean", "worst"], rows, [""] * len(rows))
+    print_table(
+        f"Model against machine ({model.name})",
+        ["kernel", "spp", "quantity", "cells", "mean", "worst"],
+        rows,
+        [""] * len(rows),
+    )
     tiles = fastest_tiles(table)
     if len(tiles):
         right = int(((tiles.ours == tiles.measured) | ~tiles.clear).sum())
