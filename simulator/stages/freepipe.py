@@ -220,7 +220,7 @@ def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: N
     drawn = wide[..., 0] != EMPTY
     mix = (halves[..., 0] & np.uint32(0xFFF)) << np.uint32(12) | halves[..., 1] & np.uint32(0xFFF)
     mixed = drawn & (mix != (wide[..., 0] & np.uint64(0xFFFFFF)))
-    ids = np.where(drawn, wide[..., 1].astype(np.int64) - 1, -1).astype(np.int32)
+    nearest = np.where(drawn, wide[..., 1].astype(np.int64) - 1, -1).astype(np.int32)
     return FreePipeFrame(nearest, halves[..., 0] >> np.uint32(12) << np.uint32(12), mix, tied, mixed)
 
 
