@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 TILE = 8  # pixels
+_EDGE_0, _EDGE_1, _EDGE_2 = np.int64(0), np.int64(1), np.int64(2)  # a kernel is compiled anew for each literal
 SAMPLE_COLUMN = np.array([[0] * 8, [0, 1] + [0] * 6, [1, 3, 0, 2] + [0] * 4, [7, 2, 4, 0, 6, 3, 1, 5]])
 """Column of the sample in each row of the pixel, by log2 of the samples."""
 
@@ -66,9 +67,9 @@ def _box_mask(header: Any, left: int, bottom: int, first: int, last: int, low: i
     if first > last or low > high:
         return mask
     x, y = left + 16 * first + 8, bottom + 16 * low + 8
-    a, ax, ay = _first_value(header, 0, x, y)
-    b, bx, by = _first_value(header, 1, x, y)
-    c, cx, cy = _first_value(header, 2, x, y)
+    a, ax, ay = _first_value(header, _EDGE_0, x, y)
+    b, bx, by = _first_value(header, _EDGE_1, x, y)
+    c, cx, cy = _first_value(header, _EDGE_2, x, y)
     a += margin * (abs(ax) + abs(ay))
     b += margin * (abs(bx) + abs(by))
     c += margin * (abs(cx) + abs(cy))
@@ -105,9 +106,9 @@ def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
     """
     samples = 1 << log_samples
     step = 3 - log_samples
-    a, ax, ay = _first_value(header, 0, x, y)
-    b, bx, by = _first_value(header, 1, x, y)
-    c, cx, cy = _first_value(header, 2, x, y)
+    a, ax, ay = _first_value(header, _EDGE_0, x, y)
+    b, bx, by = _first_value(header, _EDGE_1, x, y)
+    c, cx, cy = _first_value(header, _EDGE_2, x, y)
     mask = 0
     for i in range(samples):
         sx = (2 * SAMPLE_COLUMN[log_samples, i] + 1 - samples) << step

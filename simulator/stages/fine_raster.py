@@ -7,13 +7,14 @@ the others, and draws their fragments 32 at a time, in input order: depth test, 
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Coalescing, Simt
-from simulator.stages.borrow import borrow
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.borrow import borrow, row_of
 from simulator.stages.fine_raster_multi import draw_tile_multi
 from simulator.stages.fine_raster_queue import (
     HEADER_BYTES,
@@ -45,7 +46,7 @@ MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colou
     "color": (False, False, True, False),
 }
 WARP_LINES = int(Coalescing.WARP_LINES)
-_CHUNK = 32  # tiles that one call of the worker takes
+_PART_TILES = 32  # tiles that one call of the worker takes, at least
 
 
 class FrameBuffers(NamedTuple):
@@ -103,9 +104,9 @@ def _count_tile(draw: Draw, row: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _draw_chunk(
-    first: int,
-    last: int,
+def _draw_part(
+    part: int,
+    parts: int,
     active: Any,
     starts: Any,
     entries: Any,
@@ -113,16 +114,15 @@ def _draw_chunk(
     colors: Any,
     draw: Draw,
     buffers: Any,
+    several: Any,
     table: Any,
 ) -> None:
-    """Draw active tiles first..last-1, through arrays without reference counts."""
+    """Draw a share of the active tiles, through arrays without reference counts."""
+    first, last = active.size * part // parts, active.size * (part + 1) // parts
     tile = new_tile(1 << draw.log_samples)
     lists = borrow(starts), borrow(entries)
     lent = borrow(tile), borrow(setup), borrow(colors), borrow(buffers)
-    if table is None:
-        _draw_tiles(first, last, active, lists, *lent, draw, None)
-    else:
-        _draw_tiles(first, last, active, lists, *lent, draw, borrow(table))
+    _draw_tiles(first, last, active, lists, *lent, draw, several, borrow(table))
     tile.state[0] = 0  # the owner lives to here
 
 
@@ -137,6 +137,7 @@ def _draw_tiles(
     colors: Any,
     buffers: Any,
     draw: Draw,
+    several: Any,
     table: Any,
 ) -> None:
     starts, entries = lists
@@ -146,32 +147,22 @@ def _draw_tiles(
         x, y = (t % draw.tiles_x) * TILE, (t // draw.tiles_x) * TILE
         _load_tile(buffers, draw, tile, x, y)
         start_tile(tile, starts[t], starts[t + 1])
-        if table is None:
-            draw_tile(setup, entries, colors, draw, tile, left, bottom, None)
-        else:
-            draw_tile(setup, entries, colors, draw, tile, left, bottom, table[a])
-            _count_tile(draw, table[a])
+        row = row_of(table, a)
+        draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
+        if table is not None:
+            _count_tile(draw, row)
         _store_tile(buffers, draw, tile, x, y)
 
 
 @njit(cache=True, nogil=True)
 def draw_tile(
-    setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
+    setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, several: Any, row: Any
 ) -> None:
-    """Draw the list of one tile."""
-    if draw.log_samples > 0:
-        draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
-    else:
+    """Draw the list of one tile; without ``several`` samples a pixel (None) their code is not compiled."""
+    if several is None:
         draw_tile_single(setup, entries, colors, draw, tile, left, bottom, row)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _draw_all(
-    active: Any, starts: Any, entries: Any, setup: Setup, colors: Any, draw: Draw, buffers: Any, table: Any
-) -> None:
-    for c in prange((active.size + _CHUNK - 1) // _CHUNK):
-        last = min((c + 1) * _CHUNK, active.size)
-        _draw_chunk(c * _CHUNK, last, active, starts, entries, setup, colors, draw, buffers, table)
+    else:
+        draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
 
 
 def new_buffers(width: int, height: int, samples: int = 1) -> FrameBuffers:
@@ -267,8 +258,10 @@ def fine_raster(
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
     table = np.zeros((len(active_tiles) if counting else 0, len(FineRasterEvent)), np.int64)
     with np.errstate(all="ignore"):
-        _draw_all(
-            active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers, table if counting else None
+        for_parts(
+            _draw_part, parts_of(len(active_tiles), _PART_TILES),
+            active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers,
+            True if samples > 1 else None, table if counting else None,
         )  # fmt: skip
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
     streams = _streams(table, setup, tile_entries, buffers, draw)

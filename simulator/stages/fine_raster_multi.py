@@ -166,12 +166,12 @@ def draw_tile_multi(
             return
         n = take(tile)
         if row is not None and draw.depth:
-            count_reads(setup, draw, tile, n, 0b0001, row)
+            count_reads(setup, draw, tile, n, np.int64(0b0001), row)
         kept = _cull_fragments(setup, draw, tile, n, left, bottom, row)
         if row is not None and kept > 0:
             row[11] += 1
             row[12] += kept
-            count_reads(setup, draw, tile, kept, 0b1110 if draw.interpolate else 0b1000, row)
+            count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
         if draw.write_color:
             _shade_survivors(setup, colors, draw, tile, kept, shaded, column, line)
         for sample in range(samples):

@@ -9,6 +9,8 @@ from simulator.stages.coverage import SAMPLE_COLUMN
 from simulator.stages.exact import wrap_int32
 from simulator.stages.fine_raster_queue import Draw
 
+_PLANES = np.array([4, 7, 10])  # where the planes of 1/w, u/w and v/w begin in a record
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _plane(record: Any, at: Any, x: Any, y: Any) -> Any:
@@ -43,9 +45,9 @@ def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> 
         if sample >= 0:
             at_x = 2 * ((x << s) + SAMPLE_COLUMN[s, sample]) + 1
             at_y = 2 * ((y << s) + sample) + 1
-        w = np.float32(1) / _plane(record, 4, at_x, at_y)
-        u = w * _plane(record, 7, at_x, at_y)
-        v = w * _plane(record, 10, at_x, at_y)
+        w = np.float32(1) / _plane(record, _PLANES[0], at_x, at_y)
+        u = w * _plane(record, _PLANES[1], at_x, at_y)
+        v = w * _plane(record, _PLANES[2], at_x, at_y)
     t = np.float32(1) - u - v
     packed = np.int64(0)
     for c in range(4):

@@ -119,7 +119,7 @@ def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes
         row[19] += 2
         row[20] += 2 * _conflicts(tile, kept)
     else:
-        count_reads(setup, draw, tile, kept, 0b1110 if draw.interpolate else 0b1000, row)
+        count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
 
 
 @njit(cache=True, nogil=True)
@@ -139,7 +139,7 @@ def draw_tile_single(
             return
         n = take(tile)
         if row is not None and draw.depth:
-            count_reads(setup, draw, tile, n, 0b0001, row)
+            count_reads(setup, draw, tile, n, np.int64(0b0001), row)
         kept = _depth_test(setup, draw, tile, n, column, line) if draw.depth else n
         writes, longest = _rop(setup, colors, draw, tile, kept, column, line)
         if row is not None:

@@ -3,10 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
-_CHUNK = 16  # rows
+from simulator.parallel import for_parts, parts_of
+
+_PART_ROWS = 16  # at least
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -31,10 +33,10 @@ def _clamp(value: Any, low: Any, high: Any) -> Any:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows(first: int, last: int, ids: Any, positions: Any, triangles: Any, out: Any) -> None:
+def _rows_part(part: int, parts: int, ids: Any, positions: Any, triangles: Any, out: Any) -> None:
     height, width = ids.shape
     corners = np.empty((3, 4), np.float64)
-    for j in range(first, last):
+    for j in range(height * part // parts, height * (part + 1) // parts):
         fy = (2.0 * j + 1.0) / height - 1.0
         for i in range(width):
             t = ids[j, i]
@@ -47,12 +49,6 @@ def _rows(first: int, last: int, ids: Any, positions: Any, triangles: Any, out: 
             u, v = _clamp(u, 0.0, 1.0), _clamp(v, 0.0, 1.0)
             beyond = max(u + v, 1.0)
             out[j, i, 0], out[j, i, 1], out[j, i, 2] = u / beyond, v / beyond, _clamp(zw, -1.0, 1.0)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _all_rows(ids: Any, positions: Any, triangles: Any, out: Any) -> None:
-    for c in prange((ids.shape[0] + _CHUNK - 1) // _CHUNK):
-        _rows(c * _CHUNK, min((c + 1) * _CHUNK, ids.shape[0]), ids, positions, triangles, out)
 
 
 def pixel_barycentrics(
@@ -75,5 +71,5 @@ def pixel_barycentrics(
     """
     out = np.zeros((*ids.shape, 3), np.float32)
     with np.errstate(all="ignore"):
-        _all_rows(ids, positions, triangles, out)
+        for_parts(_rows_part, parts_of(len(ids), _PART_ROWS), ids, positions, triangles, out)
     return out

@@ -3,32 +3,27 @@
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
+from simulator.parallel import for_parts, parts_of
 from simulator.scenes.scene import Mesh, Scene
 from simulator.scenes.subpatches import with_mesh
 
 ALPHA = np.float32(0.5)  # of colours made here, as in the published benchmarks
 AMBIENT = np.float32(0.2)
-_CHUNK = 4096  # vertices
+_PART_VERTICES = 4096  # at least
 
 
 @njit(cache=True, nogil=True)
-def _transform_range(first: int, last: int, positions: Any, matrix: Any, out: Any) -> None:
-    for v in range(first, last):
+def _transform_part(part: int, parts: int, positions: Any, matrix: Any, out: Any) -> None:
+    for v in range(positions.shape[0] * part // parts, positions.shape[0] * (part + 1) // parts):
         for c in range(4):
             value = matrix[c, 0] * positions[v, 0]
             for k in range(1, 4):
                 value += matrix[c, k] * positions[v, k]
             out[v, c] = value
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _transform(positions: Any, matrix: Any, out: Any) -> None:
-    for c in prange((positions.shape[0] + _CHUNK - 1) // _CHUNK):
-        _transform_range(c * _CHUNK, min((c + 1) * _CHUNK, positions.shape[0]), positions, matrix, out)
 
 
 @njit(cache=True, nogil=True)
@@ -65,7 +60,8 @@ def clip_positions(mesh: Mesh, matrix: NDArray[np.floating]) -> NDArray[np.float
     if mesh.clip_space:
         return np.ascontiguousarray(mesh.positions)
     out = np.empty_like(mesh.positions)
-    _transform(np.ascontiguousarray(mesh.positions), np.ascontiguousarray(matrix, np.float32), out)
+    parts = parts_of(len(out), _PART_VERTICES)
+    for_parts(_transform_part, parts, np.ascontiguousarray(mesh.positions), np.asarray(matrix, np.float32, "C"), out)
     return out
 
 
