@@ -1,5 +1,6 @@
 """Figure 6: a frame in 1 to 14 batches: time of each stage, GTX 480 (Laine & Karras 2011)."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,7 @@ def run(progress: Progress) -> Result:
         "Figure 6: cost of a further batch, 1024x768, GTX 480",
         SOURCE,
         cells,
-        [Figure("batches", lambda path: _draw(table, path))],
+        [Figure(name.lower(), partial(_draw, table[table["scene"] == name], name)) for name in _scenes()],
         [
             "Slope: least squares over 1 to 14 batches, ours and theirs. Theirs is the mean over five cameras.",
             (
@@ -72,8 +73,7 @@ def _times(name: str, batches: int) -> list[dict[str, object]]:
 
 def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Cell]:
     """Milliseconds of a further batch, by stage."""
-    log = published(__file__, "gtx480-cuda40")
-    rows = log[(log["table"] == "figure6") & (log["scene"] == published_name) & (log["renderer"] == "CudaRaster")]
+    rows = _published(published_name)
     cells = []
     for stage, short in STAGES.items():
         theirs = rows[rows["column"] == f"{short}_ms"]
@@ -95,20 +95,29 @@ def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Ce
     return cells
 
 
+def _published(scene: str) -> "pd.DataFrame":
+    """Rows of the authors' log for one scene."""
+    log = published(__file__, "gtx480-cuda40")
+    return log[(log["table"] == "figure6") & (log["scene"] == scene) & (log["renderer"] == "CudaRaster")]
+
+
 def slope(x: "np.ndarray[tuple[int], np.dtype[np.int64]]", y: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
     """Least-squares slope of y over x."""
     return float(np.polyfit(x, y, 1)[0])
 
 
-def _draw(table: "pd.DataFrame", path: Path) -> None:
-    named = table.assign(line=table["scene"] + " " + table["stage"])
+def _draw(table: "pd.DataFrame", scene: str, path: Path) -> None:
+    rows = _published(scene)
+    asked = {(row.key, row.column): row.value for row in rows.itertuples()}
+    known = [asked[f"batches={row.batches}", f"{STAGES[row.stage]}_ms"] for row in table.itertuples()]
     lines(
-        named,
+        table.assign(published=known),
         path,
         x="batches",
         y="ms",
-        by="line",
-        title="Time of each stage over the batches of a frame, GTX 480 (model)",
+        by="stage",
+        published="published",
+        title=f"Stages over batches, in place of {scene}, GTX 480 (published: on the real one)",
         x_label="batches",
         y_label="time [ms]",
     )
