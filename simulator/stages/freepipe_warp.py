@@ -37,6 +37,7 @@ class Lanes(NamedTuple):
     row_columns: NDArray[np.int64]  # (32,) ... and how many there are
     seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
     most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
+    slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
 
 
 @njit(cache=True, nogil=True)
@@ -52,8 +53,9 @@ def _new_lanes():
         np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),
+        np.full((2, _SLOTS), -1, np.int64),
         np.empty((2, _SLOTS), np.int64),
-        np.empty((2, _SLOTS), np.int64),
+        np.empty((WARP, 2), np.int64),
     )
 
 
@@ -108,16 +110,21 @@ def _start_row(pieces, lanes, r, width):
 
 @njit(cache=True, nogil=True)
 def _step(pieces, lanes, active, c, word_bytes, ids):
-    """Test the c-th pixel of the row of every lane that has one; returns those lanes, and those that hit."""
+    """Test the c-th pixel of the row of every lane that has one; returns those lanes, and those that hit.
+
+    Lanes that have no such pixel leave the row, and the others close up.
+    """
     tests, hits = 0, 0
     for i in range(active):
-        if c >= lanes.row_columns[i]:
+        lane, first, columns = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i]
+        if c >= columns:
             continue
-        lane = lanes.row_lane[i]
+        if tests < i:
+            lanes.row_lane[tests], lanes.row_pixel[tests], lanes.row_columns[tests] = lane, first, columns
         tests += 1
         f = lanes.pixel[lane]
         if f[0] | f[1] | f[2] >= 0:
-            lanes.address[hits] = (lanes.row_pixel[i] + c) * word_bytes
+            lanes.address[hits] = (first + c) * word_bytes
             if ids:
                 lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
             hits += 1
@@ -165,19 +172,20 @@ def _count_atomics(lanes, hits, shape, merge, row, chunks):
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
     """
     conflicts, depth, requests = 0, 0, 0
-    for i in range(_SLOTS):
-        lanes.seen[0, i] = lanes.seen[1, i] = -1
     for i in range(hits):
         pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] // shape.word_bytes)
         chunk = _slot(lanes.seen[1], lanes.most[1], lanes.address[i] // CHUNK_BYTES)
         rank, served = lanes.most[0, pixel] + 1, lanes.most[1, chunk]
         lanes.most[0, pixel], lanes.most[1, chunk] = rank, max(rank, served)
+        lanes.slot[i, 0], lanes.slot[i, 1] = pixel, chunk
         conflicts += rank > 1
         depth = max(depth, rank)
         if merge != SECTOR or rank > served:
             requests += 1
             for plane in range(shape.words):
                 chunks[(lanes.address[i] + plane * shape.plane_bytes) // CHUNK_BYTES] += 1
+    for i in range(hits):
+        lanes.seen[0, lanes.slot[i, 0]] = lanes.seen[1, lanes.slot[i, 1]] = -1
     row[FreePipeEvent.ATOMIC] += shape.words
     row[FreePipeEvent.ATOMIC_LANES] += shape.words * hits
     row[FreePipeEvent.ATOMIC_REQUESTS] += shape.words * requests
@@ -199,8 +207,8 @@ def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
         row[FreePipeEvent.WARP_STEPS] += widest
         steps += widest
         for c in range(widest):
-            tests, hits = _step(pieces, lanes, active, c, shape.word_bytes, frame is not None)
-            row[FreePipeEvent.SAMPLE_TESTS] += tests
+            active, hits = _step(pieces, lanes, active, c, shape.word_bytes, frame is not None)
+            row[FreePipeEvent.SAMPLE_TESTS] += active
             row[FreePipeEvent.SAMPLE_HITS] += hits
             if frame is not None and hits > 0:
                 hits = _early(lanes, hits, t0, frame, shape.word_bytes, simt, row)
