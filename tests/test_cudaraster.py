@@ -9,7 +9,7 @@ from models.errors import TilestampError
 from models.simt import Simt
 from simulator.pipelines import cudaraster as module
 from simulator.pipelines.cudaraster import cudaraster
-from simulator.scenes.scene import Mesh, Patches, Scene
+from simulator.scenes.scene import Mesh, Scene
 from simulator.stages.fine_raster_queue import FineRasterEvent
 from tests import naive_cudaraster as naive
 
@@ -145,8 +145,6 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(options, sentence):
 
 
 def test_a_scene_without_triangles_is_refused():
-    with pytest.raises(TilestampError, match="no triangles"):
-        draw(Scene("patches", patches=Patches(np.ones((1, 16, 4), np.float32))))
     with pytest.raises(TilestampError, match="no triangles"):
         draw(scene(np.zeros((3, 4)), np.zeros((0, 3))))
 
