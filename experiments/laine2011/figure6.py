@@ -117,7 +117,7 @@ def _draw(table: "pd.DataFrame", scene: str, path: Path) -> None:
         y="ms",
         by="stage",
         published="published",
-        title=f"Stages over batches, in place of {scene}, GTX 480 (published: on the real one)",
+        title=f"Stages over batches, in place of {scene}, GTX 480",
         x_label="batches",
         y_label="time [ms]",
     )
