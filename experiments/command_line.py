@@ -1,30 +1,14 @@
 """The command ``tilestamp``: parses arguments, turns errors into one sentence and an exit code."""
 
 import sys
+from typing import TYPE_CHECKING
 
-from cyclopts import App, CycloptsError
-
-from experiments.commands.catalogue import catalogue
-from experiments.commands.measure_machine import measure_machine
-from experiments.commands.render import render
-from experiments.commands.reproduce import reproduce
-from experiments.commands.validate import validate
-from models.errors import TilestampError
+if TYPE_CHECKING:
+    from cyclopts import App
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-
-app = App(
-    name="tilestamp",
-    help="Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time.",
-    help_format="markdown",
-    suppress_keyboard_interrupt=False,
-)
-app.command(render)
-app.command(reproduce)
-app.command(catalogue, name="list")
-app.command(validate)
-app.command(measure_machine)
+HELP = "Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time."
 
 
 def main() -> None:
@@ -40,14 +24,42 @@ def run_command(arguments: list[str]) -> int:
     int
         0; 2 for bad input; 130 after Ctrl-C.
     """
-    try:
-        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
-    except (TilestampError, CycloptsError) as error:
-        sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}\n")
-        return BAD_INPUT
+    try:  # the imports too: they take a second in which a user may change his mind
+        return _run(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("tilestamp: interrupted; nothing was half-written\n")
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    """Run one command; bad input is one sentence."""
+    from cyclopts import CycloptsError
+
+    from models.errors import TilestampError
+
+    try:
+        _app()(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except (TilestampError, CycloptsError) as error:
+        sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}\n")
+        return BAD_INPUT
     return 0
+
+
+def _app() -> "App":
+    """Put the commands together."""
+    from cyclopts import App
+
+    from experiments.commands.catalogue import catalogue
+    from experiments.commands.measure_machine import measure_machine
+    from experiments.commands.render import render
+    from experiments.commands.reproduce import reproduce
+    from experiments.commands.validate import validate
+
+    app = App(name="tilestamp", help=HELP, help_format="markdown", suppress_keyboard_interrupt=False)
+    for command in (render, reproduce, validate, measure_machine):
+        app.command(command)
+    app.command(catalogue, name="list")
+    return app

@@ -14,7 +14,12 @@ from models.machine import altered, load_machine
 from models.price import price
 from models.traffic import Traffic, traffic
 
-GTX280 = load_machine("gtx280")
+GTX280 = altered(
+    load_machine("gtx280"),
+    {"launch.blocks_per_us": 400.0, "fixed_function.per_clock.primitives": 1.0},  # blocks start at once, round rates
+    "assumed",
+    "a test",
+)
 H200 = load_machine("h200")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 

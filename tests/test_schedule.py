@@ -15,7 +15,12 @@ from models.machine import altered, load_machine
 from models.schedule import schedule
 from models.traffic import Traffic
 
-GTX280 = load_machine("gtx280")
+GTX280 = altered(
+    load_machine("gtx280"),
+    {"launch.blocks_per_us": 400.0, "fixed_function.per_clock.primitives": 1.0},  # blocks start at once, round rates
+    "assumed",
+    "a test",
+)
 H200 = load_machine("h200")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 COLUMNS = ("FP32", "SHARED", "CHAIN_LOAD", "LOAD_BYTES", "ATOMIC_REQUESTS")

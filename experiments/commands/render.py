@@ -72,7 +72,7 @@ def render(
     output
         PNG file for the picture.
     map_
-        Also write a heat map of this counter, beside the picture.
+        Also write a heat map of this counter, beside the picture; which there are depends on the pipeline.
     json_
         Print one JSON object instead of tables.
     tile
@@ -80,7 +80,8 @@ def render(
     spp
         Samples a pixel (micropolygon).
     bound
-        Sub-patches are split until their screen box is under this many pixels.
+        Sub-patches are split until their screen box is under this many pixels, measured on control points;
+        `-O bound_rule=pixel_extent` is the reading that matches the paper's counts.
     msaa
         Samples a pixel (cudaraster).
     mode

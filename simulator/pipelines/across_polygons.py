@@ -28,7 +28,7 @@ def across_polygons(
     edge: float = 1.0,
     triangles: bool = False,
 ) -> Frame:
-    """Micropolygons in parallel: a lane each, warps as long as their longest lane.
+    """Micropolygons in parallel: a lane each, warps as long as their longest (Fatahalian et al. 2009).
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ def binned(
     opacity: float = 1.0,
     optimized: bool = True,
 ) -> Frame:
-    """Draw a mesh through bins and tiles.
+    """Textured triangles through bins, tiles, quads and fragment lists (Zhang 2025).
 
     Parameters
     ----------

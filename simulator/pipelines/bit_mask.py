@@ -32,7 +32,7 @@ def bit_mask(
     edge: float = 1.0,
     triangles: bool = False,
 ) -> Frame:
-    """Micropolygons under a bit mask a patch: samples already hit are filtered.
+    """Micropolygons under a bit mask a patch: samples already hit are filtered (Yao et al.).
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ def cudaraster(
     batches: int = 1,
     counting: bool = True,
 ) -> Frame:
-    """Draw a mesh as CudaRaster does.
+    """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
     Parameters
     ----------

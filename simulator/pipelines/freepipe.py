@@ -24,7 +24,7 @@ def freepipe(
     block: int = BLOCK,
     counting: bool = True,
 ) -> Frame:
-    """Draw a mesh with one thread a triangle.
+    """FreePipe: one thread a triangle, atomics on the frame buffer (Liu et al. 2010).
 
     Parameters
     ----------

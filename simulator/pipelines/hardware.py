@@ -24,7 +24,7 @@ def hardware(
     cull_backfaces: bool = True,
     bits: int = SUBPIXEL_BITS,
 ) -> Frame:
-    """Draw a mesh by fixed function.
+    """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def micropolygon(
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
 ) -> Frame:
-    """Draw the patches of a scene.
+    """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def per_primitive(
     texture_filter: Filter = "bilinear",
     ssao: bool = False,
 ) -> Frame:
-    """Draw a mesh triangle by triangle.
+    """Textured triangles by one thread each, with its write race (Ru 2016).
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def stamps(
     edge: float = 1.0,
     triangles: bool = False,
 ) -> Frame:
-    """Micropolygons by stamps: n x n pixels tested at once, one level or two.
+    """Micropolygons by stamps: n x n pixels tested at once, one level or two (after Fatahalian et al. 2009).
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def tiled(
     texture_filter: Filter = "bilinear",
     ssao: bool = False,
 ) -> Frame:
-    """Draw a mesh by tiles.
+    """Textured triangles by tile lists, a thread a pixel (Ru 2016).
 
     Parameters
     ----------
