@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.bin_raster import bin_raster
-from simulator.stages.coarse_raster import coarse_raster
-from simulator.stages.fine_raster import fine_raster
-from simulator.stages.pixel_barycentrics import pixel_barycentrics
-from simulator.stages.triangle_setup import MAX_SIZE, MAX_SUBTRIANGLES, triangle_setup
+from simulator.stages.laine2011.bin_raster import bin_raster
+from simulator.stages.laine2011.coarse_raster import coarse_raster
+from simulator.stages.laine2011.fine_raster import fine_raster
+from simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from simulator.stages.laine2011.triangle_setup import MAX_SIZE, MAX_SUBTRIANGLES, triangle_setup
 
 
 def rasterize(pos: NDArray[np.float32], tri: NDArray[np.int32], resolution: tuple[int, int]) -> NDArray[np.float32]:

@@ -7,8 +7,8 @@ from typing import Any
 
 from models.simt import Simt
 from simulator.scenes import load_scene
-from simulator.stages.bound_and_split import bound_and_split
-from simulator.stages.dice import Grids, dice
+from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from simulator.stages.eisenacher2010.dice import Grids, dice
 
 
 @cache

@@ -8,9 +8,9 @@ import pytest
 
 from models.errors import TilestampError
 from models.simt import Coalescing, Simt
-from simulator.stages.bin_raster import batch_size, bin_raster, initial_capacity
-from simulator.stages.bin_raster_events import BinRasterEvent
-from simulator.stages.triangle_setup import triangle_setup
+from simulator.stages.laine2011.bin_raster import batch_size, bin_raster, initial_capacity
+from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests.naive_bins import bin_queues, random_setup, rounds_of
 
 E = BinRasterEvent

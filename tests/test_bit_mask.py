@@ -5,10 +5,10 @@ import pytest
 
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.bit_mask import KINDS, BitMaskEvent, bit_mask
-from simulator.stages.micropolygon_samples import new_samples
-from simulator.stages.micropolygons import Micropolygons
-from simulator.stages.sample_positions import sample_positions
+from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, bit_mask
 from tests import naive_ste
 from tests.test_stamps import GT200, HEIGHT, WIDTH, soup
 

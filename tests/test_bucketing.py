@@ -9,12 +9,12 @@ from numba import get_num_threads, set_num_threads
 from models.atomics import count_atomics
 from models.errors import TilestampError
 from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.bucket_conflicts import list_wanted, scratch, send_requests
-from simulator.stages.bucket_count import BucketCountEvent as Event
-from simulator.stages.bucket_count import bucket_count
-from simulator.stages.bucket_scan import BucketScanEvent, bucket_scan
-from simulator.stages.bucket_write import BucketWriteEvent, bucket_write
-from simulator.stages.tile_range import screen_tiles
+from simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch, send_requests
+from simulator.stages.eisenacher2010.bucket_count import BucketCountEvent as Event
+from simulator.stages.eisenacher2010.bucket_count import bucket_count
+from simulator.stages.eisenacher2010.bucket_scan import BucketScanEvent, bucket_scan
+from simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent, bucket_write
+from simulator.stages.eisenacher2010.tile_range import screen_tiles
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_buckets, naive_conflicts
 

@@ -5,10 +5,10 @@ import pytest
 
 from models.simt import Simt
 from simulator.scenes.scene import Scene
-from simulator.stages.bin_raster import bin_raster
-from simulator.stages.coarse_raster import bin_order, coarse_raster, initial_capacity
-from simulator.stages.coarse_raster_events import CoarseRasterEvent
-from simulator.stages.triangle_setup import triangle_setup
+from simulator.stages.laine2011.bin_raster import bin_raster
+from simulator.stages.laine2011.coarse_raster import bin_order, coarse_raster, initial_capacity
+from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests.naive_bins import random_setup, tile_queues
 from tests.test_bin_raster import SCENES, gpu_input, measured
 

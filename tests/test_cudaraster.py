@@ -10,7 +10,7 @@ from models.simt import Simt
 from simulator.pipelines import cudaraster as module
 from simulator.pipelines.cudaraster import cudaraster
 from simulator.scenes.scene import Mesh, Scene
-from simulator.stages.fine_raster_queue import FineRasterEvent
+from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tests import naive_cudaraster as naive
 
 EYE = np.eye(4)

@@ -9,8 +9,8 @@ import pytest
 from models.errors import TilestampError
 from models.simt import Coalescing, Simt
 from simulator.scenes import LookAt, load_scene
-from simulator.stages.bound_and_split import SubPatches, bound_and_split
-from simulator.stages.dice import DiceEvent, dice
+from simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
+from simulator.stages.eisenacher2010.dice import DiceEvent, dice
 from tests import naive_patches
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)

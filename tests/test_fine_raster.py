@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
-from simulator.stages.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
-from simulator.stages.fine_raster_shade import blend_over
-from simulator.stages.subtriangle import DEPTH_MAX
-from simulator.stages.triangle_setup import triangle_setup
+from simulator.stages.laine2011.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
+from simulator.stages.laine2011.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
+from simulator.stages.laine2011.fine_raster_shade import blend_over
+from simulator.stages.laine2011.subtriangle import DEPTH_MAX
+from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests import naive_cudaraster as naive
 from tests.tile_lists import box_lists
 

@@ -9,9 +9,9 @@ from models.errors import TilestampError
 from models.simt import AtomicMerge, Simt
 from simulator.pipelines.freepipe import freepipe as pipeline
 from simulator.scenes.scene import Mesh, Scene
-from simulator.stages.freepipe import freepipe
-from simulator.stages.freepipe_events import FreePipeEvent
-from simulator.stages.freepipe_triangle import make_pieces
+from simulator.stages.liu2010.freepipe import freepipe
+from simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from simulator.stages.liu2010.freepipe_triangle import make_pieces
 from tests.naive_bins import covers
 
 E = FreePipeEvent

@@ -7,9 +7,9 @@ from models.errors import TilestampError
 from models.simt import AtomicMerge, Coalescing, Simt
 from simulator.pipelines.micropolygon import micropolygon
 from simulator.scenes import Scene, load_scene, read_camera
-from simulator.stages.bucket_count import BucketCountEvent
-from simulator.stages.bucket_write import BucketWriteEvent
-from simulator.stages.tile_raster_events import TileRasterEvent
+from simulator.stages.eisenacher2010.bucket_count import BucketCountEvent
+from simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 WIDTH, HEIGHT = 160, 120

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from models.errors import TilestampError
-from simulator.stages.micropolygons import Micropolygons
-from simulator.stages.motion import (
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.motion import (
     MotionEvent,
     blur_samples,
     circle_of_confusion,
@@ -13,8 +13,8 @@ from simulator.stages.motion import (
     moved,
     stratified_pattern,
 )
-from simulator.stages.motion_interleaved import motion_interleaved
-from simulator.stages.motion_interval import motion_brute_force, motion_interval
+from simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+from simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
 from tests import naive_ste
 from tests.test_stamps import HEIGHT, WIDTH, soup
 

@@ -5,11 +5,11 @@ import pytest
 
 from models.errors import TilestampError
 from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.micropolygon_samples import new_samples
-from simulator.stages.micropolygons import Micropolygons
-from simulator.stages.sample_positions import SUBPIXELS, sample_positions
-from simulator.stages.stamps import CHUNK, StampsEvent, stamp_shape, stamps
-from simulator.stages.stamps_count import count_tests
+from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
+from simulator.stages.fatahalian2009.stamps import CHUNK, StampsEvent, stamp_shape, stamps
+from simulator.stages.fatahalian2009.stamps_count import count_tests
 from tests import naive_ste
 
 WIDTH, HEIGHT = 13, 9

@@ -8,12 +8,12 @@ from numba import get_num_threads, set_num_threads
 
 from models.errors import TilestampError
 from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.bucket_count import bucket_count
-from simulator.stages.bucket_scan import bucket_scan
-from simulator.stages.bucket_write import bucket_write
-from simulator.stages.tile_range import screen_tiles
-from simulator.stages.tile_raster import tile_raster
-from simulator.stages.tile_raster_events import TileRasterEvent as Event
+from simulator.stages.eisenacher2010.bucket_count import bucket_count
+from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from simulator.stages.eisenacher2010.bucket_write import bucket_write
+from simulator.stages.eisenacher2010.tile_range import screen_tiles
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as Event
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_raster
 

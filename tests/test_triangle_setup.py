@@ -10,9 +10,16 @@ from numba import njit
 
 from models.errors import TilestampError
 from models.simt import Simt
-from simulator.stages.exact import fma, lowest_bit, popcount, round_to_int32, round_to_uint32, truncate_to_uint32
-from simulator.stages.triangle_setup import BLOCK, triangle_setup
-from simulator.stages.triangle_setup_count import TriangleSetupEvent
+from simulator.stages.laine2011.exact import (
+    fma,
+    lowest_bit,
+    popcount,
+    round_to_int32,
+    round_to_uint32,
+    truncate_to_uint32,
+)
+from simulator.stages.laine2011.triangle_setup import BLOCK, triangle_setup
+from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
 from tests import naive_cudaraster as naive
 
 E = TriangleSetupEvent

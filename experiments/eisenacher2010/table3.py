@@ -7,7 +7,7 @@ from experiments.eisenacher2010.frames import OVERHEAD_MS, SOURCE, frame, overhe
 from experiments.registry import Progress
 from experiments.result import Cell, Figure, Result, Status
 from reports.plots import stacked_bars
-from simulator.stages.tile_raster_events import TileRasterEvent as E
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 from simulator.work import Work
 
 if TYPE_CHECKING:

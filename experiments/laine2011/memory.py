@@ -8,7 +8,7 @@ from experiments.published import published
 from experiments.registry import Progress
 from experiments.result import Cell, Figure, Result, Status
 from reports.plots import paired_bars
-from simulator.stages.triangle_setup import SUBTRIANGLE_BYTES
+from simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,12 +17,12 @@ from models.price import price
 from models.simt import Simt
 from reports.plots import lines
 from simulator.mix import load_mix
-from simulator.stages.across_polygons import across_polygons
-from simulator.stages.bit_mask import bit_mask
-from simulator.stages.micropolygon_samples import Samples, new_samples
-from simulator.stages.micropolygons import Micropolygons
-from simulator.stages.sample_positions import sample_positions
-from simulator.stages.stamps import stamp_shape, stamps
+from simulator.stages.fatahalian2009.across_polygons import across_polygons
+from simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
+from simulator.stages.yao2011.bit_mask import bit_mask
 from simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take

@@ -14,8 +14,8 @@ from experiments.result import Cell, Figure, Result
 from experiments.ste.setting import random_polygons
 from reports.plots import lines
 from reports.ste_plots import heat_maps
-from simulator.stages.micropolygon_samples import Samples
-from simulator.stages.motion import (
+from simulator.stages.fatahalian2009.micropolygon_samples import Samples
+from simulator.stages.fatahalian2009.motion import (
     BlurPattern,
     MotionEvent,
     MovingMicropolygons,
@@ -24,8 +24,8 @@ from simulator.stages.motion import (
     moved,
     stratified_pattern,
 )
-from simulator.stages.motion_interleaved import motion_interleaved
-from simulator.stages.motion_interval import motion_brute_force, motion_interval
+from simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+from simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
 from simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take

@@ -15,10 +15,10 @@ from experiments.ste.setting import mean_area, random_polygons
 from models.errors import TilestampError
 from reports.plots import lines
 from simulator.scenes import load_scene, read_camera
-from simulator.stages.micropolygons import from_patches
-from simulator.stages.sample_positions import sample_positions
-from simulator.stages.stamps import stamp_shape
-from simulator.stages.stamps_count import count_tests
+from simulator.stages.fatahalian2009.micropolygons import from_patches
+from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from simulator.stages.fatahalian2009.stamps import stamp_shape
+from simulator.stages.fatahalian2009.stamps_count import count_tests
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

@@ -10,13 +10,13 @@ from experiments.validation.shuffle import shuffled
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.scenes import load_scene
-from simulator.stages.bound_and_split import bound_and_split
-from simulator.stages.bucket_count import bucket_count
-from simulator.stages.bucket_scan import bucket_scan
-from simulator.stages.bucket_write import bucket_write
-from simulator.stages.dice import Grids, dice
-from simulator.stages.tile_range import TILE_SIZES, screen_tiles
-from simulator.stages.tile_raster import tile_raster
+from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from simulator.stages.eisenacher2010.bucket_count import bucket_count
+from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from simulator.stages.eisenacher2010.bucket_write import bucket_write
+from simulator.stages.eisenacher2010.dice import Grids, dice
+from simulator.stages.eisenacher2010.tile_range import TILE_SIZES, screen_tiles
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
 from simulator.work import Work
 
 CAMERAS = "micropolygon_cameras.json"

@@ -11,13 +11,13 @@ from experiments.validation.quantities import TIME, TIME_AIM, warm_microseconds
 from models.machine import Machine
 from simulator.mix import load_mix
 from simulator.scenes import load_scene, read_camera
-from simulator.stages.bound_and_split import bound_and_split
-from simulator.stages.bucket_count import BLOCK, bucket_count
-from simulator.stages.bucket_scan import bucket_scan
-from simulator.stages.bucket_write import bucket_write
-from simulator.stages.dice import Grids, dice
-from simulator.stages.tile_range import TILE_SIZES, Tiles, screen_tiles
-from simulator.stages.tile_raster import tile_raster
+from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from simulator.stages.eisenacher2010.bucket_count import BLOCK, bucket_count
+from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from simulator.stages.eisenacher2010.bucket_write import bucket_write
+from simulator.stages.eisenacher2010.dice import Grids, dice
+from simulator.stages.eisenacher2010.tile_range import TILE_SIZES, Tiles, screen_tiles
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from simulator.stages.bin_raster import SEGMENT_BYTES as BIN_SEGMENT_BYTES
-from simulator.stages.coarse_raster import SEGMENT_BYTES as TILE_SEGMENT_BYTES
-from simulator.stages.fine_raster_queue import FineRasterEvent
-from simulator.stages.triangle_setup import SUBTRIANGLE_BYTES
-from simulator.stages.triangle_setup_count import TriangleSetupEvent
+from simulator.stages.laine2011.bin_raster import SEGMENT_BYTES as BIN_SEGMENT_BYTES
+from simulator.stages.laine2011.coarse_raster import SEGMENT_BYTES as TILE_SEGMENT_BYTES
+from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
+from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
 from simulator.work import Work
 
 Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.stages.coarse_raster import TileQueues
-from simulator.stages.coverage import SAMPLE_COLUMN
-from simulator.stages.fine_raster import FrameBuffers
-from simulator.stages.fine_raster_queue import FineRasterEvent
-from simulator.stages.pixel_barycentrics import pixel_barycentrics
-from simulator.stages.triangle_setup import Release
+from simulator.stages.laine2011.coarse_raster import TileQueues
+from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from simulator.stages.laine2011.fine_raster import FrameBuffers
+from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from simulator.stages.laine2011.triangle_setup import Release
 from simulator.work import Work
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.frame import Frame
-from simulator.stages.dice import Grids
+from simulator.stages.eisenacher2010.dice import Grids
+from simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, GRID_SIDE, QUADS
 from simulator.stages.hardware import hardware_grids
-from simulator.stages.tile_raster_samples import BACKGROUND, GRID_SIDE, QUADS
 from simulator.work import Work
 
 

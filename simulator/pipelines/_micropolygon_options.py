@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.frame import Frame
-from simulator.stages.micropolygon_samples import Samples, picture, visible
-from simulator.stages.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from simulator.work import Work
 
 

@@ -16,10 +16,10 @@ from simulator.frame import Frame
 from simulator.pipelines._cudaraster_facts import Counters, add_counters, fine_counters, frame_facts, setup_counters
 from simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
 from simulator.scenes.scene import Scene
-from simulator.stages import bin_raster as bins
-from simulator.stages import coarse_raster as tiles
-from simulator.stages.fine_raster import MODES, FrameBuffers, Mode, fine_raster
-from simulator.stages.triangle_setup import SLACK, Release, triangle_setup
+from simulator.stages.laine2011 import bin_raster as bins
+from simulator.stages.laine2011 import coarse_raster as tiles
+from simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
+from simulator.stages.laine2011.triangle_setup import SLACK, Release, triangle_setup
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 from simulator.work import Work
 

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
-from simulator.stages.freepipe import BLOCK, Packing
-from simulator.stages.freepipe import freepipe as draw
-from simulator.stages.freepipe_shade import pixel_colors
+from simulator.stages.liu2010.freepipe import BLOCK, Packing
+from simulator.stages.liu2010.freepipe import freepipe as draw
+from simulator.stages.liu2010.freepipe_shade import pixel_colors
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
-from simulator.stages.freepipe_shade import pixel_colors
 from simulator.stages.hardware import SUBPIXEL_BITS
 from simulator.stages.hardware import hardware as draw
+from simulator.stages.liu2010.freepipe_shade import pixel_colors
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 

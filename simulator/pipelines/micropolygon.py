@@ -15,14 +15,14 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines._micropolygon_hybrid import draw_grids
 from simulator.scenes.scene import Scene
-from simulator.stages.bound_and_split import BoundRule, SubPatches, bound_and_split
-from simulator.stages.bucket_count import bucket_count
-from simulator.stages.bucket_scan import bucket_scan
-from simulator.stages.bucket_write import bucket_write
-from simulator.stages.dice import dice
-from simulator.stages.tile_range import Tiles, screen_tiles
-from simulator.stages.tile_raster import tile_raster
-from simulator.stages.tile_raster_events import TileRasterEvent
+from simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
+from simulator.stages.eisenacher2010.bucket_count import bucket_count
+from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from simulator.stages.eisenacher2010.bucket_write import bucket_write
+from simulator.stages.eisenacher2010.dice import dice
+from simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 from simulator.work import Work
 
 

@@ -8,11 +8,11 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines._micropolygon_options import frame_of
 from simulator.scenes.scene import Scene
-from simulator.stages.micropolygon_samples import new_samples
-from simulator.stages.micropolygons import micropolygons
-from simulator.stages.sample_positions import sample_positions
-from simulator.stages.stamps import Touch, stamp_shape
-from simulator.stages.stamps import stamps as draw_stamps
+from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from simulator.stages.fatahalian2009.micropolygons import micropolygons
+from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from simulator.stages.fatahalian2009.stamps import Touch, stamp_shape
+from simulator.stages.fatahalian2009.stamps import stamps as draw_stamps
 
 
 def stamps(

@@ -5,7 +5,7 @@ high, aimed at the middle of the model's box, in which the whole model lies insi
 number a model is **fitted**: the distance of the eye, on the patches rasterized at 1600x1200 with a bound of 4
 (Table 2).
 
-Everything else is a prediction, with ``bound_rule="pixel_extent"`` (``simulator/stages/bound_and_split.py``); in
+Everything else is a prediction, with ``bound_rule="pixel_extent"`` (``bound_and_split``); in
 brackets with ``control_points``, each with a distance fitted for it. Error of the patches rasterized, 8x8 tiles:
 
 ========  ==========  ================  ================  ================

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from models.launch import Stream
 from simulator.parallel import for_parts
-from simulator.stages.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
+from simulator.stages.liu2010.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
 from simulator.work import FixedFunctionWork
 
 SUBPIXEL_BITS = 8

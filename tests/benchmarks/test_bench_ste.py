@@ -5,10 +5,10 @@ import pytest
 
 from experiments.ste.setting import cube
 from simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
-from simulator.stages.micropolygons import Micropolygons
-from simulator.stages.sample_positions import sample_positions
-from simulator.stages.stamps import stamp_shape
-from simulator.stages.stamps_count import count_tests
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from simulator.stages.fatahalian2009.stamps import stamp_shape
+from simulator.stages.fatahalian2009.stamps_count import count_tests
 
 MICROQUADS = 4_000_000
 WIDTH, HEIGHT = 1600, 1200

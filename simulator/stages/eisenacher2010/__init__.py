@@ -1,0 +1,1 @@
+"""Eisenacher & Loop 2010: bound and split, dice, bucketing, tile raster."""

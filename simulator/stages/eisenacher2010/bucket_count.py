@@ -1,0 +1,275 @@
+"""Parallel bucketing, first half: init and address calculation (Eisenacher & Loop 2010, section 3.2).
+
+COUNT is set to zero. Then one thread a patch adds one to the counter of each tile that the patch overlaps, by
+``atomicAdd``; the value returned is the patch's place in that tile's list and is kept in IDX.
+
+We let the warps run in the order of the patch queue, one after the other. A real machine is free to mix them; the
+picture depends on it only where two samples have the same depth. Conflicts do not depend on it: they are counted warp
+by warp, slot by slot, on the real tiles. Options that the paper lacks: counters some words apart, and one atomic for
+all lanes of a warp that want the same tile.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numba import get_num_threads, njit
+from numpy.typing import NDArray
+
+from models.atomics import CHUNK_BYTES
+from models.coalescing import contiguous, transactions
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts
+from simulator.stages.eisenacher2010.bucket_conflicts import (
+    atomic_rule,
+    keep_leaders,
+    list_wanted,
+    scratch,
+    send_requests,
+)
+from simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles
+from simulator.work import Work
+
+BLOCK = 256  # threads: one a patch
+WORD_BYTES = 4
+BOX_BYTES = 16  # x0, y0, x1, y1 of a patch
+
+
+class BucketInitEvent(IntEnum):
+    """Events of one block of the init kernel."""
+
+    STORE_WARPS = 0  # one word set to zero a lane
+    STORE_LANES = 1
+    STORE_TRANSACTIONS = 2
+    STORE_BYTES = 3
+
+
+class BucketCountEvent(IntEnum):
+    """Events of one block of the address calculation."""
+
+    PATCH_WARPS = 0  # warps that have a patch: load its box, find its tiles, store IDX
+    PATCH_LANES = 1
+    SLOT_WARPS = 2  # tests whether a slot holds a tile
+    DIVERGENT_WARPS = 3  # of those, tests that split the warp
+    ATOMIC = 4  # atomic instructions: slots that hold a tile in at least one lane
+    ATOMIC_LANES = 5
+    ATOMIC_REQUESTS = 6
+    ATOMIC_CONFLICTS = 7  # lanes at a counter that an earlier lane of the instruction wants
+    ATOMIC_DEPTH = 8  # sum over instructions of the lanes at the most wanted counter
+    GROUP_DEPTH = 9  # the same for the lanes that arrive together: half-warps on 1.x
+    LOCK_DEPTH = 10  # the same by 32-byte chunk (the width of a GT200 lock), for the lanes that arrive together
+    ATOMIC_SECTORS = 11  # distinct 32-byte chunks, summed over instructions
+    SLOT_LANES = 12  # patches in tiles: what is written to the lists
+    LOAD_TRANSACTIONS = 13
+    LOAD_BYTES = 14
+    STORE_TRANSACTIONS = 15
+    STORE_BYTES = 16
+
+
+_E = BucketCountEvent
+
+
+@njit(cache=True, nogil=True)
+def _place(slots, count, idx):
+    """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
+    patches = idx.shape[0]
+    warps, sides, lanes = slots.shape
+    for warp in range(warps):
+        first = warp * lanes
+        for slot in range(sides):
+            for lane in range(min(lanes, patches - first)):
+                tile = slots[warp, slot, lane]
+                if tile >= 0:
+                    idx[first + lane, slot] = count[tile]
+                    count[tile] += 1
+
+
+@njit(cache=True, nogil=True)
+def _count_atomic(tile, lanes, rule, aggregate, wanted, row, chunk_requests, leaders):
+    """Events of one slot in one warp."""
+    active = active_lanes(tile, lanes)
+    row[_E.SLOT_WARPS] += 1
+    if active == 0:
+        return
+    row[_E.DIVERGENT_WARPS] += active < lanes
+    row[_E.SLOT_LANES] += active
+    if aggregate:
+        keep_leaders(tile, lanes, leaders)
+        tile = leaders
+        active = active_lanes(tile, lanes)
+    group_depth = lock_depth = 0
+    if rule.group < rule.warp:
+        for start in range(0, lanes, rule.group):
+            _, _, most, chunk_most = list_wanted(tile, start, min(start + rule.group, lanes), rule.padding, wanted)
+            group_depth += most
+            lock_depth += chunk_most
+    counters, chunks, depth, chunk_depth = list_wanted(tile, 0, lanes, rule.padding, wanted)
+    row[_E.ATOMIC] += 1
+    row[_E.ATOMIC_LANES] += active
+    row[_E.ATOMIC_REQUESTS] += send_requests(wanted, chunks, rule.merge, chunk_requests)
+    row[_E.ATOMIC_CONFLICTS] += active - counters
+    row[_E.ATOMIC_DEPTH] += depth
+    row[_E.GROUP_DEPTH] += group_depth if rule.group < rule.warp else depth
+    row[_E.LOCK_DEPTH] += lock_depth if rule.group < rule.warp else chunk_depth
+    row[_E.ATOMIC_SECTORS] += chunks
+
+
+@njit(cache=True, nogil=True)
+def active_lanes(tile, lanes):
+    """Lanes whose slot holds a tile."""
+    active = 0
+    for lane in range(lanes):
+        active += tile[lane] >= 0
+    return active
+
+
+@njit(cache=True, nogil=True)
+def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
+    """Load of the boxes and store of IDX by one warp: transactions and bytes of each.
+
+    Four words a patch at once for 2x2 slots, else an array a slot.
+    """
+    for lane in range(lanes):
+        addresses[lane] = (first + lane) * BOX_BYTES
+    loads, load_bytes = transactions(addresses, lanes, BOX_BYTES, coalescing)
+    if slots == 2:
+        return loads, load_bytes, loads, load_bytes
+    stores = store_bytes = 0
+    for slot in range(slots**2):
+        count, size = contiguous((slot * patches + first) * WORD_BYTES, lanes * WORD_BYTES, coalescing)
+        stores += count
+        store_bytes += size
+    return loads, load_bytes, stores, store_bytes
+
+
+@njit(cache=True, nogil=True)
+def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests):
+    """Tiles of all lanes and slots in the blocks of one part, and their events; a row of ``requests`` a part."""
+    patches = boxes.shape[0]
+    blocks = (patches + BLOCK - 1) // BLOCK
+    chunk_requests = requests[part]
+    wanted = scratch(rule.warp)
+    addresses = np.empty(rule.warp, np.int64)
+    traffic = patch_traffic(0, rule.warp, patches, tiles.slots, coalescing, addresses)
+    for block in range(part * blocks // parts, (part + 1) * blocks // parts):
+        for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), rule.warp):
+            lanes = min(rule.warp, patches - first)
+            tile = slots[first // rule.warp]
+            slot_tiles(boxes, first, lanes, tiles, tile)
+            if table is not None:
+                row = table[block]
+                if lanes < rule.warp or tiles.slots > 2:  # else as aligned as every full warp
+                    traffic = patch_traffic(first, lanes, patches, tiles.slots, coalescing, addresses)
+                row[_E.PATCH_WARPS] += 1
+                row[_E.PATCH_LANES] += lanes
+                row[_E.LOAD_TRANSACTIONS] += traffic[0]
+                row[_E.LOAD_BYTES] += traffic[1]
+                row[_E.STORE_TRANSACTIONS] += traffic[2]
+                row[_E.STORE_BYTES] += traffic[3]
+                for slot in range(tiles.slots**2):
+                    _count_atomic(tile[slot], lanes, rule, aggregate, wanted, row, chunk_requests, addresses)
+
+
+def bucket_count(
+    boxes: NDArray[np.float32],
+    tiles: Tiles,
+    simt: Simt,
+    *,
+    padding: int = 1,
+    aggregate: bool = False,
+    counting: bool = True,
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], list[Work]]:
+    """Count the patches of each tile and give each patch its place.
+
+    Parameters
+    ----------
+    boxes : ndarray, (N, 4), float32
+        x0, y0, x1, y1 of the 16 diced vertices, pixels, y down, in the order of the patch queue.
+    tiles : Tiles
+    simt : Simt
+    padding : int
+        Words from one counter to the next (not in the paper).
+    aggregate : bool
+        One atomic for all lanes of a warp that want the same tile (not in the paper).
+    counting : bool
+        Without it no events are counted and no works come back.
+
+    Returns
+    -------
+    count : ndarray, (tiles,), uint32
+        COUNT: patches in each tile.
+    idx : ndarray, (N, slots**2), uint32
+        IDX: place of the patch in the list of the tile in each slot; 0 where the slot holds no tile.
+    works : list of Work
+        Init and address calculation, a row a block.
+    """
+    rule = atomic_rule(simt, padding)
+    blocks, parts = -(-len(boxes) // BLOCK), get_num_threads()
+    slots = np.empty((-(-len(boxes) // rule.warp), tiles.slots**2, rule.warp), np.int64)
+    table = np.zeros((blocks, len(_E)), np.int64) if counting else None
+    chunks = -(-tiles.total * padding * WORD_BYTES // CHUNK_BYTES) if counting else 0
+    requests = np.zeros((parts, chunks), np.int64)
+    coalescing = int(simt.coalescing)
+    for_parts(_find_tiles, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests)
+    count = np.zeros(tiles.total, np.uint32)
+    idx = np.zeros((len(boxes), tiles.slots**2), np.uint32)
+    _place(slots, count, idx)
+    if table is None:
+        return count, idx, []
+    return (
+        count,
+        idx,
+        [
+            _init_work(tiles, padding, simt),
+            _address_work(boxes, tiles, table, requests.sum(axis=0), aggregate=aggregate),
+        ],
+    )
+
+
+def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
+    """Work of setting COUNT to zero."""
+    words = tiles.total * padding
+    sizes = np.full(-(-words // BLOCK), BLOCK)
+    sizes[-1] = words - BLOCK * (len(sizes) - 1)
+    table = np.zeros((len(sizes), len(BucketInitEvent)), np.int64)
+    table[:, BucketInitEvent.STORE_WARPS] = -(-sizes // simt.warp)
+    table[:, BucketInitEvent.STORE_LANES] = sizes
+    for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
+        size = int(sizes[rows.start or 0])
+        stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
+        table[rows, BucketInitEvent.STORE_TRANSACTIONS : BucketInitEvent.STORE_BYTES + 1] = stores
+    stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
+    return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))
+
+
+def _address_work(
+    boxes: NDArray[np.float32],
+    tiles: Tiles,
+    table: NDArray[np.int64],
+    requests: NDArray[np.int64],
+    *,
+    aggregate: bool,
+) -> Work:
+    """Work of the address calculation."""
+    total = table.sum(axis=0)
+    streams = (
+        Stream("boxes", "load", int(total[_E.LOAD_BYTES]), boxes.nbytes),
+        Stream("IDX", "store", int(total[_E.STORE_BYTES]), len(boxes) * tiles.slots**2 * WORD_BYTES),
+        Stream(
+            "COUNT",
+            "atomic",
+            int(total[_E.ATOMIC_REQUESTS]) * CHUNK_BYTES,
+            int(np.count_nonzero(requests)) * CHUNK_BYTES,
+        ),
+    )
+    return Work(
+        "bucket_count",
+        "address_calculation",
+        _E,
+        table,
+        len(table),
+        BLOCK,
+        streams=streams,
+        atomic_requests=requests,
+        variant=tiles.variant + " aggregated" * aggregate,
+    )

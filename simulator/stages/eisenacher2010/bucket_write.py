@@ -1,0 +1,152 @@
+"""Parallel bucketing, second half: bucket write (Eisenacher & Loop 2010, section 3.2).
+
+One thread a patch again: for each tile that the patch overlaps, ``LISTS[START[tile] + IDX] = patch``.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.coalescing import transactions
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.eisenacher2010.bucket_count import BLOCK, WORD_BYTES, active_lanes, patch_traffic
+from simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
+from simulator.work import Work
+
+
+class BucketWriteEvent(IntEnum):
+    """Events of one block."""
+
+    PATCH_WARPS = 0  # warps that have a patch: load its box and IDX, find its tiles
+    PATCH_LANES = 1
+    SLOT_WARPS = 2  # tests whether a slot holds a tile
+    DIVERGENT_WARPS = 3  # of those, tests that split the warp
+    WRITE_WARPS = 4  # slots written: load START, store the patch
+    WRITE_LANES = 5
+    LOAD_TRANSACTIONS = 6
+    LOAD_BYTES = 7
+    STORE_TRANSACTIONS = 8
+    STORE_BYTES = 9
+    BOX_BYTES = 10  # of LOAD_BYTES: boxes
+    IDX_BYTES = 11  # of LOAD_BYTES: IDX
+    LAST_WRITE_WARPS = 12  # of WRITE_WARPS: the last slot, which compilers branch around and do not predicate
+    LAST_WRITE_LANES = 13
+
+
+_E = BucketWriteEvent
+
+
+@njit(cache=True, nogil=True)
+def _write(boxes, tiles, start, idx, lists):
+    """Fill LISTS."""
+    for p in range(boxes.shape[0]):
+        x0, y0, x1, y1 = tile_range(boxes[p], tiles)
+        for y in range(y0, y1 + 1):
+            for x in range(x0, x1 + 1):
+                lists[start[y * tiles.columns + x] + idx[p, (y - y0) * tiles.slots + x - x0]] = p
+
+
+@njit(cache=True, nogil=True)
+def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row):
+    """Count loads of START and stores to LISTS of one slot in one warp, at their real addresses."""
+    active = active_lanes(tile, lanes)
+    row[_E.SLOT_WARPS] += 1
+    if active == 0:
+        return
+    row[_E.DIVERGENT_WARPS] += active < lanes
+    row[_E.WRITE_WARPS] += 1
+    if slot == idx.shape[1] - 1:
+        row[_E.LAST_WRITE_WARPS] += 1
+        row[_E.LAST_WRITE_LANES] += active
+    row[_E.WRITE_LANES] += active
+    for lane in range(lanes):
+        addresses[lane] = max(tile[lane] * WORD_BYTES, -1)
+    count, size = transactions(addresses, lanes, WORD_BYTES, coalescing)
+    row[_E.LOAD_TRANSACTIONS] += count
+    row[_E.LOAD_BYTES] += size
+    for lane in range(lanes):
+        if tile[lane] >= 0:
+            addresses[lane] = (np.int64(start[tile[lane]]) + np.int64(idx[first + lane, slot])) * WORD_BYTES
+    count, size = transactions(addresses, lanes, WORD_BYTES, coalescing)
+    row[_E.STORE_TRANSACTIONS] += count
+    row[_E.STORE_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_blocks(part, parts, boxes, tiles, warp, start, idx, coalescing, table):
+    """Events of the blocks of one part."""
+    patches, blocks = boxes.shape[0], table.shape[0]
+    slots = np.empty((tiles.slots**2, warp), np.int64)
+    addresses = np.empty(warp, np.int64)
+    traffic = patch_traffic(0, warp, patches, tiles.slots, coalescing, addresses)
+    for block in range(part * blocks // parts, (part + 1) * blocks // parts):
+        row = table[block]
+        for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), warp):
+            lanes = min(warp, patches - first)
+            if lanes < warp or tiles.slots > 2:  # else as aligned as every full warp
+                traffic = patch_traffic(first, lanes, patches, tiles.slots, coalescing, addresses)
+            row[_E.PATCH_WARPS] += 1
+            row[_E.PATCH_LANES] += lanes
+            row[_E.LOAD_TRANSACTIONS] += traffic[0] + traffic[2]  # IDX is read as it was written
+            row[_E.LOAD_BYTES] += traffic[1] + traffic[3]
+            row[_E.BOX_BYTES] += traffic[1]
+            row[_E.IDX_BYTES] += traffic[3]
+            slot_tiles(boxes, first, lanes, tiles, slots)
+            for slot in range(tiles.slots**2):
+                _count_slot(slots[slot], first, lanes, slot, start, idx, coalescing, addresses, row)
+
+
+def bucket_write(
+    boxes: NDArray[np.float32],
+    tiles: Tiles,
+    count: NDArray[np.uint32],
+    start: NDArray[np.uint32],
+    idx: NDArray[np.uint32],
+    simt: Simt,
+    *,
+    counting: bool = True,
+) -> tuple[NDArray[np.uint32], list[Work]]:
+    """Write the list of patches of each tile.
+
+    Parameters
+    ----------
+    boxes : ndarray, (N, 4), float32
+        As for ``bucket_count``.
+    tiles : Tiles
+    count, start : ndarray, (tiles,), uint32
+        COUNT and START.
+    idx : ndarray, (N, slots**2), uint32
+        IDX.
+    simt : Simt
+    counting : bool
+        Without it no works come back.
+
+    Returns
+    -------
+    lists : ndarray, (sum of count,), uint32
+        LISTS: patches of tile t at start[t]..start[t]+count[t]-1.
+    works : list of Work
+        One, a row a block.
+    """
+    lists = np.empty(int(count.sum(dtype=np.int64)), np.uint32)
+    _write(boxes, tiles, start, idx, lists)
+    if not counting:
+        return lists, []
+    table = np.zeros((-(-len(boxes) // BLOCK), len(_E)), np.int64)
+    parts = parts_of(len(table))
+    for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
+    total = table.sum(axis=0)
+    own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])
+    streams = (
+        Stream("boxes", "load", int(total[_E.BOX_BYTES]), boxes.nbytes),
+        Stream("IDX", "load", int(total[_E.IDX_BYTES]), len(boxes) * tiles.slots**2 * WORD_BYTES),
+        Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
+        Stream("LISTS", "store", int(total[_E.STORE_BYTES]), lists.nbytes),
+    )
+    return lists, [
+        Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)
+    ]

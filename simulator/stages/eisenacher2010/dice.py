@@ -1,0 +1,274 @@
+"""Dice: every sub-patch becomes a 4x4 grid of shaded vertices (Eisenacher & Loop 2010, section 3).
+
+"Then we evaluate a 4x4 grid for each sub-patch and shade the vertices. Position and color are written to a VBO." Like
+the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch. The kernel here evaluates grids as
+tensor products instead, rows first, a batch of them side by side, which changes no count.
+
+A vertex is 16 bytes: x, y in pixels from the top left corner, depth z/w, and the colour as RGBA8 in the bits of the
+fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from models.coalescing import transactions
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.eisenacher2010 import shading
+from simulator.stages.eisenacher2010.bezier import (
+    LANES,
+    basis,
+    evaluate,
+    evaluate_point,
+    gather,
+    new_squares,
+    restrict,
+    screen_points,
+    set_square,
+)
+from simulator.stages.eisenacher2010.bound_and_split import SubPatches
+from simulator.stages.eisenacher2010.shading import (
+    MATT,
+    NORMAL,
+    NUDGE,
+    lighting,
+    new_grid,
+    packed_color,
+    set_normals,
+    shade,
+    tangent,
+)
+from simulator.work import Work
+
+BLOCK = 256  # threads, a vertex each: 16 sub-patches
+VERTICES = 16  # of a grid
+GRID_SIDE = 4  # vertices
+VERTEX_BYTES = 16
+POINT_BYTES = 16  # a homogeneous control point
+ENTRY_BYTES = 8  # of the patch queue
+BOX_BYTES = 16
+
+
+class DiceEvent(IntEnum):
+    """Events of one block: 16 sub-patches, a thread a vertex."""
+
+    VERTEX_WARPS = 0  # warps that evaluate, shade and store a vertex a lane
+    VERTEX_LANES = 1
+    PATCHES = 2  # sub-patches
+    LOAD_TRANSACTIONS = 3  # queue entry, and each lane one control point of its patch into shared memory
+    LOAD_BYTES = 4
+    STORE_TRANSACTIONS = 5  # vertices, and a box a sub-patch
+    STORE_BYTES = 6
+    TEXTURE_LANES = 7  # texels fetched
+
+
+class Grids(NamedTuple):
+    """Diced sub-patches, in the order of the queue."""
+
+    vertices: NDArray[np.float32]  # (N, 16, 4) x, y in pixels, z/w, RGBA8 bits; vertex 4 * row + column
+    boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the 16 vertices
+
+
+_E = DiceEvent
+
+
+@njit(cache=True, nogil=True)
+def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
+    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
+    middle = np.float32(0.5)
+    values = np.zeros((4, 3), np.float32)  # a coordinate a row: point, derivatives along u and v
+    values[3, 0] = 1
+    for n in range(lanes):
+        for k in range(VERTICES):
+            at = k * LANES + n
+            if grid.rows[MATT + at] > 0:
+                continue
+            u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / np.float32(3)
+            v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / np.float32(3)
+            evaluate_point(net, n, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE, values)
+            ux, uy, uz = tangent(values, 1)
+            vx, vy, vz = tangent(values, 2)
+            grid.rows[NORMAL + at] = uy * vz - uz * vy
+            grid.rows[NORMAL + shading.VERTICES + at] = uz * vx - ux * vz
+            grid.rows[NORMAL + 2 * shading.VERTICES + at] = ux * vy - uy * vx
+
+
+@njit(cache=True, nogil=True)
+def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, boxes: Any) -> Any:
+    """Write the vertices of each lane, and bound them."""
+    screen = grid.screen
+    for n in range(lanes):
+        x0 = y0 = np.float32(np.inf)
+        x1 = y1 = np.float32(-np.inf)
+        for k in range(VERTICES):
+            x, y = screen[k * LANES + n], screen[shading.VERTICES + k * LANES + n]
+            z = screen[3 * shading.VERTICES + k * LANES + n]
+            vertices[first + n, k, 0], vertices[first + n, k, 1], vertices[first + n, k, 2] = x, y, z
+            colors[first + n, k, 3] = packed_color(grid.rows, k * LANES + n)
+            x0, x1 = min(x0, x), max(x1, x)
+            y0, y1 = min(y0, y), max(y1, y)
+        boxes[first + n, 0], boxes[first + n, 1], boxes[first + n, 2], boxes[first + n, 3] = x0, y0, x1, y1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project(s: Any) -> Any:
+    """Divide the screen rows of all vertices by w."""
+    for k in range(shading.VERTICES):
+        scale = np.float32(1) / s[2 * shading.VERTICES + k]
+        s[k] *= scale
+        s[shading.VERTICES + k] *= scale
+        s[3 * shading.VERTICES + k] *= scale
+
+
+@njit(cache=True, nogil=True)
+def _dice(
+    part: Any,
+    parts: Any,
+    side: Any,
+    width: Any,
+    subpatches: Any,
+    nets: Any,
+    screen: Any,
+    light: Any,
+    texture: Any,
+    vertices: Any,
+    colors: Any,
+    boxes: Any,
+) -> Any:
+    """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
+    grid, squares = new_grid(side, width), new_squares(width)
+    corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)
+    number = boxes.shape[0]
+    batches = (number + LANES - 1) // LANES
+    for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):
+        lanes = min(LANES, number - first)
+        for n in range(width):
+            set_square(squares, n, subpatches, first + min(n, lanes - 1))
+        basis(squares.i, squares.side, grid.by_u, grid.slope_u)
+        basis(squares.j, squares.side, grid.by_v, grid.slope_v)
+        gather(screen, squares.patch, corners)
+        restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
+        _project(grid.rows)
+        gather(nets, squares.patch, net)
+        evaluate(
+            net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
+        )
+        if set_normals(grid.rows):
+            _borrow_normals(grid, net, squares, lanes)
+        shade(grid, light, texture, squares)
+        _store_grids(grid, first, lanes, vertices, colors, boxes)
+
+
+def dice(
+    points: NDArray[np.float32],
+    subpatches: SubPatches,
+    matrix: ArrayLike,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    texture: NDArray[np.uint8] | None = None,
+    counting: bool = True,
+) -> tuple[Grids, list[Work]]:
+    """Evaluate and shade a 4x4 grid for each sub-patch.
+
+    Parameters
+    ----------
+    points : ndarray, (P, 16, 4), float32
+        Homogeneous control points (wx, wy, wz, w) of the urPatches.
+    subpatches : SubPatches
+    matrix : array-like, (4, 4)
+        Model to clip space, for column vectors.
+    width, height : int
+        Pixels.
+    simt : Simt
+    texture : ndarray, (H, W, 3 or 4), uint8, optional
+        Laid over each urPatch, u to the right and v down; a solid checker if not given.
+    counting : bool
+        Without it no works come back.
+
+    Returns
+    -------
+    grids : Grids
+    works : list of Work
+        One, a row a block.
+
+    Raises
+    ------
+    TilestampError
+        A texture of another shape or type, or numbers that are not finite.
+    """
+    if texture is not None and not (
+        texture.ndim == 3 and texture.shape[2] in (3, 4) and texture.size and texture.dtype == np.uint8
+    ):
+        raise TilestampError(f"texture must be (H, W, 3 or 4) bytes, not {texture.dtype} of shape {texture.shape}")
+    dimensions = 3 if (points[..., 3] == 1).all() else 4
+    nets = np.ascontiguousarray(points[..., :dimensions].transpose(0, 2, 1))
+    screen = screen_points(points, matrix, width, height)
+    number = len(subpatches.patch)
+    vertices = np.empty((number, VERTICES, 4), np.float32)
+    grids = Grids(vertices, np.empty((number, 4), np.float32))
+    light = lighting(points, matrix)
+    colors = vertices.view(np.uint32)
+    for_parts(
+        _dice,
+        parts_of(number, BLOCK),
+        GRID_SIDE,
+        LANES,
+        subpatches,
+        nets,
+        screen,
+        light,
+        texture,
+        vertices,
+        colors,
+        grids.boxes,
+    )
+    return grids, [_dice_work(number, len(points), texture is not None, simt)] if counting else []
+
+
+def _dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
+    """Work of dicing: nothing depends on the data, but that the last block may be partly empty."""
+    per_block = BLOCK // VERTICES
+    grids = np.minimum(per_block, number - per_block * np.arange(-(-number // per_block)))
+    table = np.zeros((len(grids), len(_E)), np.int64)
+    table[:, _E.PATCHES] = grids
+    table[:, _E.VERTEX_LANES] = grids * VERTICES
+    table[:, _E.VERTEX_WARPS] = -(-grids * VERTICES // simt.warp)
+    table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
+    for count in np.unique(grids):
+        loads, stores = _block_traffic(int(count), simt)
+        table[grids == count, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = loads
+        table[grids == count, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = stores
+    moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
+    entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
+    streams = (
+        Stream("queue", "load", entries, entries),
+        Stream("points", "load", moved - entries, patches * VERTICES * POINT_BYTES),
+        Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES),
+        Stream("boxes", "store", boxes, boxes),
+    )
+    return Work("dice", "dice", _E, table, len(table), BLOCK, VERTICES * POINT_BYTES * per_block, streams=streams)
+
+
+def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Transactions and bytes of a block's loads, and of its stores.
+
+    Half-warps read different patches, whose 256 bytes never share a segment with another patch.
+    """
+    loads, stores = np.zeros(2, np.int64), np.zeros(2, np.int64)
+    for first in range(0, grids * VERTICES, simt.warp):
+        lanes = min(simt.warp, grids * VERTICES - first)
+        lane = np.arange(first, first + lanes)
+        whole = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, int(simt.coalescing))
+        entry = transactions(lane // VERTICES * ENTRY_BYTES, lanes, ENTRY_BYTES, int(simt.coalescing))
+        box = np.where(lane % VERTICES == 0, lane // VERTICES * BOX_BYTES, -1)
+        loads += np.add(whole, entry)
+        stores += np.add(whole, transactions(box, lanes, BOX_BYTES, int(simt.coalescing)))
+    return loads, stores

@@ -1,0 +1,220 @@
+"""Tile raster: one block a tile, one thread a pixel (Eisenacher & Loop 2010, section 3.3).
+
+The block loads the grids of its list to shared memory, batch by batch, and every thread walks through all quads: box
+tests, four edge functions, z, z-test, colour; depth and colour stay in registers. With 4 or 16 samples a pixel the tile
+is drawn in 2x2 or 4x4 sub-tiles, so that neighbouring threads test neighbouring samples.
+
+What runs here is smarter than what is charged: only the samples inside a quad's box are evaluated, while the machine is
+charged for every warp and lane that its kernel would keep busy (``tile_raster_events``). With the box tests off, lanes
+outside a quad's box are charged for the edge functions and taken as misses.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.eisenacher2010.tile_range import Tiles
+from simulator.stages.eisenacher2010.tile_raster_events import (
+    EDGE_VECTORS,
+    VECTOR_BYTES,
+    VERTICES,
+    WORD_BYTES,
+    BlockShape,
+    TileRasterEvent,
+    block_shape,
+    block_traffic,
+    box_warps,
+    count_block,
+    count_stores,
+)
+from simulator.stages.eisenacher2010.tile_raster_resolve import resolve
+from simulator.stages.eisenacher2010.tile_raster_samples import (
+    BACKGROUND,
+    FAR,
+    QUADS,
+    Samples,
+    quad_box,
+    sample_quad,
+    sample_span,
+)
+from simulator.work import Work
+
+SAMPLES_A_PIXEL = (1, 4, 16)
+SMALLEST_WARP = 16  # lanes: 16 load a grid together
+
+_E = TileRasterEvent
+_HIT_WARPS = int(_E.HIT_WARPS)
+_Z_WARPS = int(_E.Z_WARPS)
+
+
+@njit(cache=True, nogil=True)
+def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
+    """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
+    tile, side, size = shape.tile, shape.side, shape.subtile
+    left, top = origin
+    for quad in range(QUADS):
+        v = quad + quad // 3
+        x0, y0, x1, y1 = quad_box(vertices, grid, v)
+        if x1 < left or x0 > left + tile or y1 < top or y0 > top + tile:
+            continue
+        i0, i1 = sample_span(x0, x1, left, side, tile * side)
+        j0, j1 = sample_span(y0, y1, top, side, tile * side)
+        for sub in range(side * side):
+            i, j = sub & (side - 1), sub >> shape.side_bits
+            if x1 < left + i * size or x0 > left + (i + 1) * size or y1 < top + j * size or y0 > top + (j + 1) * size:
+                continue
+            span = (max(i0, i * tile), min(i1, i * tile + tile - 1), max(j0, j * tile), min(j1, j * tile + tile - 1))
+            columns, rows = span[1] - span[0] + 1, span[3] - span[2] + 1
+            inside = columns > 0 and rows > 0
+            if row is not None and shape.box_tests:
+                row[_E.SUBTILE_PASS] += 1
+                if inside:
+                    row[_E.BOX_WARPS] += box_warps(span, shape)
+                    row[_E.BOX_LANES] += columns * rows
+            if inside:
+                sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, _HIT_WARPS, _Z_WARPS)
+
+
+@njit(cache=True, nogil=True)
+def _raster_rows(
+    part, parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
+):
+    """Every ``parts``-th row of tiles."""
+    size = shape.tile * shape.side
+    samples = Samples(
+        np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
+    )
+    addresses = np.empty(shape.warp, np.int64)
+    height, width = depth.shape
+    for tile_row in range(part, tiles.rows, parts):
+        for column in range(tiles.columns):
+            block = tile_row * tiles.columns + column
+            first, grids = np.int64(start[block]), np.int64(count[block])
+            row = None if table is None else table[block]
+            origin = (np.float64(column * shape.tile), np.float64(tile_row * shape.tile))
+            samples.depth[:] = FAR
+            samples.color[:] = BACKGROUND
+            samples.hits[:] = 0
+            for k in range(first, first + grids):
+                _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
+            resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
+            if row is not None:
+                count_block(block, lists, first, grids, shape, traffic, row)
+                count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
+
+
+def tile_raster(
+    vertices: NDArray[np.float32],
+    count: NDArray[np.uint32],
+    start: NDArray[np.uint32],
+    lists: NDArray[np.uint32],
+    tiles: Tiles,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    spp: int = 1,
+    box_tests: bool = True,
+    edges: Literal["computed", "loaded"] = "computed",
+    counting: bool = True,
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32] | None, list[Work]]:
+    """Draw the grids of each tile.
+
+    Parameters
+    ----------
+    vertices : ndarray, (N, 16, 4), float32
+        Screen x and y (pixels, y down), z (smaller is nearer), and the packed colour's bits, of 4x4 vertices a grid.
+    count, start : ndarray, (tiles,), uint32
+        COUNT and START.
+    lists : ndarray, uint32
+        LISTS: the grids of each tile.
+    tiles : Tiles
+    width, height : int
+        Pixels.
+    simt : Simt
+    spp : int
+        Samples a pixel: 1, 4 or 16.
+    box_tests : bool
+        Test a quad's box against sub-tiles and samples before the edge functions.
+    edges : {"computed", "loaded"}
+        Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture.
+    counting : bool
+        Without it no events are counted and no works come back.
+
+    Returns
+    -------
+    image : ndarray, (H, W, 3), uint8
+    depth : ndarray, (H, W), float32
+        Depth of the nearest sample of each pixel; 1 where nothing was drawn.
+    overdraw : ndarray, (H, W), int32, or None
+        Quads that cover a sample, summed over the samples of each pixel.
+    works : list of Work
+        One, a row a tile.
+
+    Raises
+    ------
+    TilestampError
+        Samples a pixel, edges or a warp that the kernel does not have.
+    """
+    if spp not in SAMPLES_A_PIXEL:
+        raise TilestampError(f"spp must be 1, 4 or 16 samples a pixel, not {spp}")
+    if edges not in ("computed", "loaded"):
+        raise TilestampError(f"edges must be computed or loaded, not {edges}")
+    if simt.warp < SMALLEST_WARP or simt.warp.bit_count() > 1:
+        raise TilestampError(f"tile_raster needs warps of 16, 32 or 64 lanes, not {simt.warp}")
+    shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+    image = np.empty((height, width, 3), np.uint8)
+    depth = np.empty((height, width), np.float32)
+    overdraw = np.empty((height, width), np.int32) if counting else None
+    table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
+    traffic = block_traffic(shape, simt)
+    colors = vertices.view(np.uint32)[:, :, 3]
+    buffers = (image, depth, overdraw, table)
+    for_parts(
+        _raster_rows, parts_of(tiles.rows), vertices, colors, count, start, lists, tiles, shape, traffic, *buffers
+    )
+    works = [] if table is None else [_work(shape, table, lists, len(vertices), traffic.grid_bytes)]
+    return image, depth, overdraw, works
+
+
+def shared_bytes(shape: BlockShape) -> int:
+    """Shared memory a block: a batch of grids, their edge equations if loaded, all samples where they are resolved."""
+    threads = shape.tile**2
+    grids = threads // VERTICES
+    samples = threads * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
+    return grids * (VERTICES + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
+
+
+def _work(shape: BlockShape, table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, grid_bytes: int) -> Work:
+    """Work of the kernel, with the buffers that it touches."""
+    total = table.sum(axis=0)
+    seen = np.zeros(grids, np.bool_)
+    seen[lists] = True
+    drawn = int(np.count_nonzero(seen))
+    vertex_bytes = int(total[_E.GRIDS]) * grid_bytes
+    edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
+    rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
+    streams = [
+        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES),
+        Stream("LISTS", "load", rest, lists.nbytes + 2 * len(table) * WORD_BYTES),
+        Stream("framebuffer", "store", int(total[_E.STORE_BYTES]), int(total[_E.STORE_BYTES])),
+    ]
+    if shape.loaded:
+        streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
+    return Work(
+        "tile_raster",
+        "tile_raster",
+        _E,
+        table,
+        len(table),
+        shape.tile**2,
+        shared_bytes(shape),
+        streams=tuple(streams),
+        variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
+    )

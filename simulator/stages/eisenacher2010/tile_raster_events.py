@@ -1,0 +1,227 @@
+"""What one block of the tile raster costs, whatever its quads cover: grids, batches, memory, barriers.
+
+A block reads its list of grids in batches, as many as it has threads for (16 vertices a grid), and walks through all
+quads of a batch with all its warps.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.banks import bank_passes
+from models.coalescing import contiguous, transactions
+from models.simt import Coalescing, Simt
+from simulator.stages.eisenacher2010.tile_raster_resolve import resolve_replays
+from simulator.stages.eisenacher2010.tile_raster_samples import QUADS
+
+VERTICES = 16  # a grid
+VECTOR_BYTES = 16  # a vertex; and the width of a load
+VECTOR_WORDS = 4
+WORD_BYTES = 4
+EDGE_VECTORS = 27  # a grid: 12 floats a quad, where edge equations are loaded
+EDGE_ALIGNMENTS = 8  # ways in which 432 bytes lie in 128-byte segments
+BROADCAST_LOADS = 4  # vertices that each lane reads for a quad
+EDGE_LOADS = 3  # vectors that each lane reads for the edges of a quad
+_HALF_WARP = int(Coalescing.HALF_WARP_SEGMENTS)
+
+
+class TileRasterEvent(IntEnum):
+    """Events of one block, which is one tile.
+
+    ``X_WARPS`` counts the executions of a piece of code by a warp, ``X_LANES`` the lanes active meanwhile.
+    """
+
+    PIXEL_WARPS = 0  # start and end of the kernel
+    PIXEL_LANES = 1
+    GRIDS = 2  # grids in the tile's list
+    BATCHES = 3  # times that the block fills its shared memory with grids
+    BATCH_WARPS = 4
+    GATHER_WARPS = 5  # warps that load an index and a vertex a lane, and leave the vertex in shared memory
+    GATHER_LANES = 6
+    EDGE_GATHER_WARPS = 7  # the same for vectors of edge equations, where they are loaded
+    EDGE_GATHER_LANES = 8
+    QUAD_WARPS = 9  # quads that a warp looks at: four vertices read, their box found
+    QUAD_LANES = 10
+    SUBTILE_TEST_WARPS = 11  # tests of a quad's box against a sub-tile, the same for all lanes
+    SUBTILE_TEST_LANES = 12
+    SUBTILE_PASS = 13  # pairs of quad and sub-tile that go on, counted once a block
+    BOX_TEST_WARPS = 14  # tests of a quad's box against each lane's sample
+    BOX_TEST_LANES = 15
+    BOX_WARPS = 16  # edge functions evaluated: at least one lane's sample is in the box
+    BOX_LANES = 17
+    EDGE_SETUP_WARPS = 18  # of BOX_WARPS: with edge equations computed from the vertices
+    HIT_WARPS = 19  # at least one sample covered: z interpolated
+    HIT_LANES = 20
+    Z_WARPS = 21  # at least one z-test passed: colour interpolated
+    Z_LANES = 22
+    SAMPLE_TESTS = 23  # point-in-quad evaluations, lanes along for the ride included
+    SAMPLE_HITS = 24
+    RESOLVE_WARPS = 25  # samples stored to shared memory and gathered again
+    SHARED_ACCESSES = 26  # warp instructions, the loads and stores named above
+    BANK_REPLAYS = 27
+    BARRIERS = 28  # one for each warp that arrives
+    LOAD_TRANSACTIONS = 29
+    LOAD_BYTES = 30
+    STORE_TRANSACTIONS = 31
+    STORE_BYTES = 32
+    LIST_WARPS = 33  # of PIXEL_WARPS: in a tile that has grids
+
+
+_E = TileRasterEvent
+
+
+class BlockShape(NamedTuple):
+    """A block and its machine, as kernels take them: integers only."""
+
+    tile: int  # pixels a side
+    side: int  # sub-tiles a side: samples a pixel are side**2
+    side_bits: int  # log2 of it
+    subtile: float  # pixels a side of a sub-tile
+    warp: int
+    warp_bits: int  # log2 of the lanes: kernels shift, a division would be most of their work
+    warps: int
+    coalescing: int
+    box_tests: bool
+    loaded: bool  # edge equations are loaded
+
+
+class BlockTraffic(NamedTuple):
+    """Memory traffic that is alike in all blocks."""
+
+    grid_transactions: int  # vertices of one grid
+    grid_bytes: int
+    edges: NDArray[np.int64]  # transactions and bytes of one grid's edge equations, by its alignment
+    gather_replays: int  # shared store of a full warp of vectors
+    resolve_replays: int  # of a block
+
+
+def block_shape(tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool) -> BlockShape:
+    """Shape of a block of ``tile**2`` threads."""
+    side = {1: 1, 4: 2, 16: 4}[spp]
+    bits = simt.warp.bit_length() - 1
+    warps = -(-tile * tile // simt.warp)
+    return BlockShape(
+        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests, loaded
+    )
+
+
+def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
+    """Count what is alike in all blocks."""
+    lanes = np.arange(VERTICES, dtype=np.int64) * VECTOR_BYTES
+    edges = np.zeros((EDGE_ALIGNMENTS, 2), np.int64)
+    for grid in range(EDGE_ALIGNMENTS):
+        base = grid * EDGE_VECTORS * VECTOR_BYTES
+        edges[grid] += transactions(lanes + base, VERTICES, VECTOR_BYTES, shape.coalescing)
+        base += VERTICES * VECTOR_BYTES
+        edges[grid] += transactions(lanes + base, EDGE_VECTORS - VERTICES, VECTOR_BYTES, shape.coalescing)
+    full = min(shape.warp, shape.tile**2)
+    passes = 0  # wide accesses go word by word on 1.x, in groups that fill the banks once later
+    if shape.coalescing == _HALF_WARP:
+        passes = VECTOR_WORDS * bank_passes(np.arange(full) * VECTOR_WORDS, full, simt.banks, simt.bank_lanes)
+    gather = max(passes, -(-full * VECTOR_WORDS // simt.banks)) - -(-full // simt.bank_lanes)
+    resolved = 0
+    if shape.side > 1:
+        resolved = resolve_replays(shape.tile, shape.side, simt.warp, simt.banks, simt.bank_lanes)
+    grid = transactions(lanes, VERTICES, VECTOR_BYTES, shape.coalescing)
+    return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
+
+
+@njit(cache=True, nogil=True)
+def box_warps(span, shape):
+    """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
+    mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
+    first_row, last_row = span[2] & mask, span[3] & mask
+    if shape.warp >= shape.tile:  # a warp holds whole rows
+        return (last_row * shape.tile >> bits) - (first_row * shape.tile >> bits) + 1
+    return (last_row - first_row + 1) * (((span[1] & mask) >> bits) - ((span[0] & mask) >> bits) + 1)
+
+
+@njit(cache=True, nogil=True)
+def count_block(block, lists, first, grids, shape, traffic, row):
+    """Add the events that depend on the length of the list only, and the memory traffic of loads."""
+    threads = shape.tile * shape.tile
+    batch = threads // VERTICES
+    quads = grids * QUADS
+    subtiles = shape.side * shape.side
+    row[_E.PIXEL_WARPS] = row[_E.RESOLVE_WARPS] = shape.warps
+    row[_E.PIXEL_LANES] = threads
+    row[_E.LIST_WARPS] = shape.warps if grids > 0 else 0
+    row[_E.GRIDS] = grids
+    row[_E.BATCHES] = (grids + batch - 1) // batch
+    row[_E.BATCH_WARPS] = row[_E.BATCHES] * shape.warps
+    row[_E.QUAD_WARPS] = quads * shape.warps
+    row[_E.QUAD_LANES] = quads * threads
+    if shape.box_tests:
+        row[_E.SUBTILE_TEST_WARPS] = quads * subtiles * shape.warps
+        row[_E.SUBTILE_TEST_LANES] = quads * subtiles * threads
+        row[_E.BOX_TEST_WARPS] = row[_E.SUBTILE_PASS] * shape.warps
+        row[_E.BOX_TEST_LANES] = row[_E.SUBTILE_PASS] * threads
+    else:
+        row[_E.SUBTILE_PASS] = quads * subtiles
+        row[_E.BOX_WARPS] = quads * subtiles * shape.warps
+        row[_E.BOX_LANES] = quads * subtiles * threads
+    row[_E.EDGE_SETUP_WARPS] = 0 if shape.loaded else row[_E.BOX_WARPS]
+    row[_E.SAMPLE_TESTS] = row[_E.BOX_WARPS] * min(shape.warp, threads)
+    row[_E.SAMPLE_HITS] = row[_E.HIT_LANES]
+    _count_loads(block, lists, first, grids, shape, traffic, row)
+    row[_E.SHARED_ACCESSES] += row[_E.GATHER_WARPS] + BROADCAST_LOADS * row[_E.QUAD_WARPS]
+    row[_E.BANK_REPLAYS] += row[_E.GATHER_WARPS] * traffic.gather_replays
+    if shape.loaded:
+        row[_E.SHARED_ACCESSES] += row[_E.EDGE_GATHER_WARPS] + EDGE_LOADS * row[_E.BOX_WARPS]
+        row[_E.BANK_REPLAYS] += row[_E.EDGE_GATHER_WARPS] * traffic.gather_replays
+    row[_E.BARRIERS] = 2 * row[_E.BATCH_WARPS]
+    if subtiles == 1:
+        row[_E.RESOLVE_WARPS] = 0
+    else:
+        row[_E.SHARED_ACCESSES] += 2 * subtiles * shape.warps
+        row[_E.BANK_REPLAYS] += traffic.resolve_replays
+        row[_E.BARRIERS] += 2 * shape.warps
+
+
+@njit(cache=True, nogil=True)
+def _count_loads(block, lists, first, grids, shape, traffic, row):
+    """COUNT by every warp, START if there are grids; then an index for 16 lanes, a grid and its edges by the same."""
+    together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // VERTICES)  # grids an instruction
+    requests = shape.warps * (max(1, shape.warp // VERTICES) if shape.coalescing == _HALF_WARP else 1)
+    count, size = contiguous(block * WORD_BYTES, WORD_BYTES, shape.coalescing)
+    words = 2 if grids > 0 else 1
+    row[_E.LOAD_TRANSACTIONS] += words * requests * count
+    row[_E.LOAD_BYTES] += words * requests * size
+    batch = shape.tile * shape.tile // VERTICES
+    for base in range(0, grids, batch):
+        loaded = min(batch, grids - base)
+        warps = (loaded * VERTICES + shape.warp - 1) // shape.warp
+        row[_E.GATHER_WARPS] += warps
+        row[_E.GATHER_LANES] += loaded * VERTICES
+        for i in range(base, base + loaded, together):
+            indices = min(together, base + loaded - i)
+            count, size = contiguous((first + i) * WORD_BYTES, indices * WORD_BYTES, shape.coalescing)
+            row[_E.LOAD_TRANSACTIONS] += count
+            row[_E.LOAD_BYTES] += size
+        if shape.loaded:
+            row[_E.EDGE_GATHER_WARPS] += 2 * warps
+            row[_E.EDGE_GATHER_LANES] += loaded * EDGE_VECTORS
+            for i in range(base, base + loaded):
+                row[_E.LOAD_TRANSACTIONS] += traffic.edges[lists[first + i] % EDGE_ALIGNMENTS, 0]
+                row[_E.LOAD_BYTES] += traffic.edges[lists[first + i] % EDGE_ALIGNMENTS, 1]
+    row[_E.LOAD_TRANSACTIONS] += grids * traffic.grid_transactions
+    row[_E.LOAD_BYTES] += grids * traffic.grid_bytes
+
+
+@njit(cache=True, nogil=True)
+def count_stores(x0, y0, width, height, shape, addresses, row):
+    """Colour of each pixel on the screen, and depth where there is one sample a pixel."""
+    threads = shape.tile * shape.tile
+    buffers = 2 if shape.side == 1 else 1
+    for first in range(0, threads, shape.warp):
+        lanes = min(shape.warp, threads - first)
+        for lane in range(lanes):
+            y = y0 + (first + lane) // shape.tile
+            x = x0 + (first + lane) % shape.tile
+            addresses[lane] = (y * width + x) * WORD_BYTES if x < width and y < height else -1
+        count, size = transactions(addresses, lanes, WORD_BYTES, shape.coalescing)
+        row[_E.STORE_TRANSACTIONS] += buffers * count
+        row[_E.STORE_BYTES] += buffers * size

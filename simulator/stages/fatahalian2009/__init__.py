@@ -1,0 +1,1 @@
+"""Fatahalian et al. 2009: stamps, lanes across polygons, motion blur and defocus."""

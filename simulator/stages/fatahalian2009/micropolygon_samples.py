@@ -1,0 +1,122 @@
+"""The sample buffer that all micropolygon rasterizers write: nearest depth and its polygon, 64 bits a sample.
+
+A hit is one atomic minimum of depth and polygon in one 64-bit word; ties go to the lower polygon number, so that the
+picture does not depend on the order of arrival.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.atomics import add_requests, count_atomics
+from models.simt import Simt
+from simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+
+WORD_BYTES = 8  # depth and polygon
+BACKGROUND = 255
+
+
+class Samples(NamedTuple):
+    """Sample buffers of one frame.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+    offsets : ndarray, (spp, 2), int64
+        Positions in the pixel, sub-pixel steps.
+    depth : ndarray, (H * W * spp,), float32
+    polygon : ndarray, (H * W * spp,), int32
+        Nearest polygon, -1 where nothing was drawn.
+    tests : ndarray, (H, W), int32
+        Sample tests made in each pixel.
+    requests : ndarray, (chunks,), int64
+        Atomic requests by 32-byte chunk.
+    """
+
+    width: int
+    height: int
+    offsets: NDArray[np.int64]
+    depth: NDArray[np.float32]
+    polygon: NDArray[np.int32]
+    tests: NDArray[np.int32]
+    requests: NDArray[np.int64]
+
+
+def new_samples(width: int, height: int, offsets: NDArray[np.int64]) -> Samples:
+    """Empty buffers."""
+    count = width * height * len(offsets)
+    return Samples(
+        width,
+        height,
+        offsets,
+        np.full(count, np.inf, np.float32),
+        np.full(count, -1, np.int32),
+        np.zeros((height, width), np.int32),
+        np.zeros(-(-count * WORD_BYTES // 32), np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def keep_nearest(samples, x, y, s, depth, polygon):
+    """Atomic minimum of one hit; returns the byte address it went to."""
+    at = (y * samples.width + x) * len(samples.offsets) + s
+    if depth < samples.depth[at] or (depth == samples.depth[at] and polygon < samples.polygon[at]):
+        samples.depth[at] = depth
+        samples.polygon[at] = polygon
+    return at * WORD_BYTES
+
+
+@njit(cache=True, nogil=True)
+def count_hits(row, first, samples, addresses, hits, merge):
+    """Add one warp's atomic instruction to columns ``first``.. of a row: lanes, requests, conflicts, depth.
+
+    ``addresses`` begins with those of the ``hits`` lanes that hit, in lane order.
+    """
+    active, requests, conflicts, depth = count_atomics(addresses, hits, merge)
+    row[first] += active
+    row[first + 1] += requests
+    row[first + 2] += conflicts
+    row[first + 3] += depth
+    add_requests(addresses, hits, merge, 0, samples.requests)
+
+
+@njit(cache=True, nogil=True)
+def on_screen(boxes, width, height):
+    """Clip a polygon's box to the screen: x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if nothing is left."""
+    return (
+        max(boxes[0, 0], 0),
+        max(boxes[0, 1], 0),
+        min(boxes[0, 2], width * STEP - 1),
+        min(boxes[0, 3], height * STEP - 1),
+    )
+
+
+@njit(cache=True, nogil=True)
+def pixel_box(boxes, width, height):
+    """First and last pixel (x0, y0, x1, y1) of a polygon's box, on screen; empty if x1 < x0 or y1 < y0."""
+    x0, y0, x1, y1 = on_screen(boxes, width, height)
+    return x0 >> STEP_BITS, y0 >> STEP_BITS, x1 >> STEP_BITS, y1 >> STEP_BITS
+
+
+def picture(samples: Samples, polygons: Micropolygons) -> NDArray[np.uint8]:
+    """Mean over the samples of each pixel, (H, W, 3) uint8, on white."""
+    grey = np.append(polygons.shade, np.uint8(BACKGROUND))[samples.polygon]
+    mean = grey.reshape(samples.height, samples.width, -1).mean(axis=2)
+    return np.repeat(np.round(mean)[:, :, None], 3, axis=2).astype(np.uint8)
+
+
+def visible(samples: Samples, values: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
+    """Polygon at the first sample of each pixel, (H, W) int32, -1 where none; or its entry in ``values``."""
+    first = samples.polygon.reshape(samples.height, samples.width, -1)[:, :, 0]
+    if values is None:
+        return first
+    return np.where(first >= 0, np.append(values, np.int32(-1))[first], np.int32(-1)).astype(np.int32)
+
+
+def blocks(simt: Simt, warps: int) -> int:
+    """Count the persistent blocks of ``warps`` warps: 32 warps on every SM."""
+    return simt.sms * max(1, 32 // warps)

@@ -1,0 +1,112 @@
+"""Sample tests and hits of stamps, counted without making the tests: closed form a box, for millions of polygons.
+
+A polygon's tests are its stamps times a stamp's samples; its hits do not depend on the stamp, so only the samples of
+its own box are looked at. The counts are those that ``stamps`` counts by executing.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import get_num_threads, njit, prange
+from numpy.typing import NDArray
+
+from simulator.stages.fatahalian2009.micropolygon_cover import (
+    STEP,
+    covering_triangle,
+    new_setup,
+    set_edges,
+    snap,
+    touches,
+)
+from simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
+from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from simulator.stages.fatahalian2009.stamps import StampShape
+
+PARTS = 16  # pieces of work for each thread
+
+
+class SampleCount(NamedTuple):
+    """Sample tests and hits of a set of polygons."""
+
+    tests: int
+    hits: int
+
+    @property
+    def ste(self) -> float:
+        """Sample test efficiency."""
+        return self.hits / self.tests if self.tests else float("nan")
+
+
+def count_tests(
+    polygons: Micropolygons, width: int, height: int, offsets: NDArray[np.int64], shape: StampShape
+) -> SampleCount:
+    """Count the sample tests of one-level stamps, and their hits.
+
+    Parameters
+    ----------
+    polygons : Micropolygons
+    width, height : int
+        Pixels.
+    offsets : ndarray, (spp, 2), int64
+        See ``sample_positions``.
+    shape : StampShape
+        One level.
+    """
+    parts = PARTS * get_num_threads()
+    counts = np.zeros((parts, 2), np.int64)
+    _count_parallel(polygons.vertices, width, height, offsets, shape, counts)
+    tests, hits = counts.sum(axis=0).tolist()
+    return SampleCount(tests, hits)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _count_parallel(vertices, width, height, offsets, shape, counts):
+    for part in prange(len(counts)):
+        _count(vertices, part, width, height, offsets, shape, counts)
+
+
+@njit(cache=True, nogil=True)
+def _count(vertices, part, width, height, offsets, shape, counts):
+    """Count the polygons of one part; edges are set up only where a sample lies in the box, or stamps are chosen."""
+    edges, boxes, depths, snapped = new_setup()
+    stamps = 0
+    hits = 0
+    for p in range(part * len(vertices) // len(counts), (part + 1) * len(vertices) // len(counts)):
+        snap(vertices[p], boxes, snapped)
+        x0, y0, x1, y1 = pixel_box(boxes, width, height)
+        if x1 < x0 or y1 < y0:
+            continue
+        i0, j0 = x0 // shape.width, y0 // shape.height
+        i1, j1 = x1 // shape.width, y1 // shape.height
+        ready = False
+        if shape.polygon:
+            set_edges(vertices[p], edges, boxes, depths, snapped)
+            ready = True
+            stamps += _touched(edges, boxes, vertices.shape[1], shape, i0, j0, i1, j1)
+        else:
+            stamps += (i1 - i0 + 1) * (j1 - j0 + 1)
+        for y in range(y0, y1 + 1):
+            for x in range(x0, x1 + 1):
+                for s in range(len(offsets)):
+                    at_x, at_y = x * STEP + offsets[s, 0], y * STEP + offsets[s, 1]
+                    if at_x < boxes[0, 0] or at_y < boxes[0, 1] or at_x > boxes[0, 2] or at_y > boxes[0, 3]:
+                        continue
+                    if not ready:
+                        set_edges(vertices[p], edges, boxes, depths, snapped)
+                        ready = True
+                    hits += covering_triangle(edges, at_x, at_y) >= 0
+    counts[part, 0] = stamps * shape.width * shape.height * len(offsets)
+    counts[part, 1] = hits
+
+
+@njit(cache=True, nogil=True)
+def _touched(edges, boxes, corners, shape, i0, j0, i1, j1):
+    """Stamps of a box that the polygon reaches; one that holds all of a polygon with an area certainly is."""
+    wide, high = shape.width * STEP, shape.height * STEP
+    if i0 == i1 and j0 == j1 and boxes[0, 0] >= i0 * wide and boxes[0, 1] >= j0 * high and edges[0, 0] != 0:
+        return 1
+    count = 0
+    for j in range(j0, j1 + 1):
+        for i in range(i0, i1 + 1):
+            count += touches(edges, boxes, corners, i * wide, j * high, (i + 1) * wide, (j + 1) * high)
+    return count

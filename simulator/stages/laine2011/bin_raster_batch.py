@@ -1,0 +1,259 @@
+"""One batch of bin raster: reads, rounds of 512 and the three coverage paths (Laine & Karras 2011, section 4).
+
+A batch is what a block draws from its queue. It is played twice: ``_count_batch`` counts the entries of each bin and
+every event, ``_fill_batch`` writes the entries where the counts have made room. Both take the same rounds, because
+the path of a warp (which decides whether its triangles are tested) depends on the company that they are in.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from simulator.stages.laine2011.bin_raster_cover import (
+    BIN_SIDE_LOG2,
+    SINGLE_TRIANGLE,
+    WARP,
+    _entry_slot,
+    _header_load,
+    _lane_box,
+    _lane_edges,
+    _new_boxes,
+    _small_votes,
+    _touches,
+    _walk_votes,
+)
+from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+
+BLOCK = 512  # threads, and triangles of a round
+RING = 2048  # entries that wait for their round
+BIN_SEGMENT = 512  # entries
+ENTRY_BYTES = 4
+SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x 2, anything
+
+
+class BinInput(NamedTuple):
+    """What triangle setup leaves for bin raster, and the grid of bins."""
+
+    subtriangles: NDArray[np.uint8]
+    headers: NDArray[np.int16]
+    misc: NDArray[np.uint32]
+    half_x: int  # sub-pixels from the lower-left corner to the centre of the viewport
+    half_y: int
+    bins_x: int
+    bins_y: int
+    segment_bytes: int  # of the machine's memory transactions
+
+
+class BinScratch(NamedTuple):
+    """Working space of one batch."""
+
+    ring: NDArray[np.int64]  # (RING,) queue entries
+    before: NDArray[np.int64]  # (bins,) entries before the round
+    stamp: NDArray[np.int64]  # (steps, bins) last warp and memory segment that wrote to the bin at that step
+    warps: NDArray[np.int64]  # (1,) warps so far
+
+
+@njit(cache=True, nogil=True)
+def _new_scratch(bins, counting):
+    steps = bins if counting else 0
+    stamp = np.zeros((steps, bins), np.int64)
+    return BinScratch(np.empty(RING, np.int64), np.zeros(bins, np.int64), stamp, np.zeros(1, np.int64))
+
+
+@njit(cache=True, nogil=True)
+def _count_load(events, loads, segments, size):
+    events[BinRasterEvent.LOAD] += loads
+    events[BinRasterEvent.LOAD_TRANSACTIONS] += segments
+    events[BinRasterEvent.LOAD_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_atomic(events, executed):
+    """One thread's global atomic: a draw, or the allocation of a round's segments."""
+    events[BinRasterEvent.ATOMIC] += executed
+    events[BinRasterEvent.ATOMIC_LANES] += executed
+    events[BinRasterEvent.ATOMIC_REQUESTS] += executed
+    events[BinRasterEvent.ATOMIC_DEPTH] += executed
+
+
+@njit(cache=True, nogil=True)
+def _read_step(given, ring, read, write, first, end, events):
+    """Read 512 counts and append their sub-triangles in order; returns the next triangle and the ring's end.
+
+    The first triangle whose sub-triangles do not all fit, and all after it, are read again later.
+    """
+    last = min(first + BLOCK, end)
+    go_on = last
+    visible, start = 0, write
+    for triangle in range(first, last):
+        n = int(given.subtriangles[triangle])
+        visible += n > 0
+        if go_on < last:
+            continue
+        if write + n - read > RING:
+            go_on = triangle
+            continue
+        for k in range(n):
+            ring[(write + k) % RING] = triangle * 8 + (SINGLE_TRIANGLE if n == 1 else k)
+        write += n
+    if events is not None:
+        warps = (last - first + WARP - 1) // WARP
+        events[BinRasterEvent.READ_STEPS] += 1
+        events[BinRasterEvent.READ_WARPS] += warps
+        events[BinRasterEvent.READ_LANES] += last - first
+        events[BinRasterEvent.VISIBLE_LANES] += visible
+        events[BinRasterEvent.ENTRIES] += write - start
+        events[BinRasterEvent.OVERFLOWS] += go_on < last
+        for start in range(first, last, WARP):  # a byte a lane
+            segments = (min(start + WARP, last) - 1) // given.segment_bytes - start // given.segment_bytes + 1
+            _count_load(events, 1, segments, segments * given.segment_bytes)
+    return go_on, write
+
+
+@njit(cache=True, nogil=True)
+def _load_warp(given, ring, first, lanes, boxes):
+    """Boxes of a warp's triangles; returns the path that follows from them, and the bins of the largest box."""
+    largest, path = 1, SINGLE
+    last_x, last_y = given.bins_x - 1, given.bins_y - 1
+    for lane in range(lanes):
+        slot = _entry_slot(ring[(first + lane) % RING], given.misc)
+        boxes.slot[lane] = slot
+        _lane_box(boxes, lane, given.headers[slot], given.half_x, given.half_y, BIN_SIDE_LOG2, last_x, last_y)
+        columns, rows = boxes.box[lane, 2], boxes.box[lane, 3]
+        largest = max(largest, columns * rows)
+        if columns > 2 or rows > 2:
+            path = SLOW
+        elif columns * rows > 1 and path == SINGLE:
+            path = FAST
+    if path == SLOW:
+        for lane in range(lanes):
+            _lane_edges(boxes, lane, given.headers[boxes.slot[lane]], given.half_x, given.half_y, BIN_SIDE_LOG2)
+    return path, largest
+
+
+@njit(cache=True, nogil=True)
+def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, events):
+    """Append a warp's triangles to the bins that they touch; count the segments of memory that this writes."""
+    emits, stores = 0, 0
+    for lane in range(lanes):
+        box = boxes.box[lane]
+        step = 0
+        for row in range(box[3]):
+            for column in range(box[2]):
+                if path != SLOW or _touches(boxes, lane, column, row):
+                    b = box[0] + column + (box[1] + row) * given.bins_x
+                    if entries is not None:
+                        entries[counts[b]] = scratch.ring[(first + lane) % RING]
+                    if events is not None:
+                        mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES // given.segment_bytes)
+                        stores += scratch.stamp[step, b] != mark
+                        scratch.stamp[step, b] = mark
+                    counts[b] += 1
+                    emits += 1
+                step += 1
+    if events is not None:
+        events[BinRasterEvent.EMITS] += emits
+        events[BinRasterEvent.STORE_TRANSACTIONS] += stores
+        events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
+
+
+@njit(cache=True, nogil=True)
+def _distinct_bins(boxes, lanes):
+    """Distinct bins of a warp whose boxes are one bin each."""
+    distinct = 0
+    for lane in range(lanes):
+        new = True
+        for other in range(lane - 1, -1, -1):
+            if boxes.box[other, 0] == boxes.box[lane, 0] and boxes.box[other, 1] == boxes.box[lane, 1]:
+                new = False
+                break
+        distinct += new
+    return distinct
+
+
+@njit(cache=True, nogil=True)
+def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
+    """Count what a warp's loads, its path and the walk to its queues cost."""
+    area, indirect = 0, False
+    for lane in range(lanes):
+        area += boxes.box[lane, 2] * boxes.box[lane, 3]
+        indirect |= scratch.ring[(first + lane) % RING] & 7 != SINGLE_TRIANGLE
+    events[BinRasterEvent.BOX_BINS] += area
+    events[BinRasterEvent.INDIRECT_WARPS] += indirect
+    if path == SINGLE:
+        events[BinRasterEvent.SINGLE_WARPS] += 1
+        events[BinRasterEvent.SINGLE_LANES] += lanes
+        events[BinRasterEvent.SINGLE_LOOPS] += _distinct_bins(boxes, lanes)
+        ors, replays = 0, 0
+    elif path == FAST:
+        events[BinRasterEvent.FAST_WARPS] += 1
+        events[BinRasterEvent.FAST_LANES] += lanes
+        ors, replays = _small_votes(boxes, lanes, given.bins_x)
+    else:
+        events[BinRasterEvent.SLOW_WARPS] += 1
+        events[BinRasterEvent.SLOW_LANES] += lanes
+        events[BinRasterEvent.SLOW_STEPS] += largest
+        events[BinRasterEvent.SLOW_LANE_STEPS] += area
+        ors, replays = _walk_votes(boxes, lanes, largest, given.bins_x)
+    events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
+    events[BinRasterEvent.SHARED_ATOMIC] += ors
+    events[BinRasterEvent.BANK_REPLAYS] += replays
+    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
+
+
+@njit(cache=True, nogil=True)
+def _count_segments(counts, before, events):
+    """Count new segments of a round: a bin needs one where its entries pass a multiple of 512."""
+    fresh, warps = 0, 0
+    for first in range(0, counts.size, WARP):
+        mine = 0
+        for b in range(first, min(first + WARP, counts.size)):
+            mine += _segments(counts[b]) - _segments(before[b])
+            before[b] = counts[b]
+        fresh, warps = fresh + mine, warps + (mine > 0)
+    events[BinRasterEvent.SEGMENTS] += fresh
+    events[BinRasterEvent.ALLOC_WARPS] += warps
+    events[BinRasterEvent.SHARED_ATOMIC] += warps
+    events[BinRasterEvent.ALLOC_ROUNDS] += fresh > 0
+    _count_atomic(events, fresh > 0)
+
+
+@njit(cache=True, nogil=True)
+def _segments(entries):
+    return (entries + BIN_SEGMENT - 1) // BIN_SEGMENT
+
+
+@njit(cache=True, nogil=True)
+def _play_batch(given, b, batch, counts, entries, events):
+    """Bin the input triangles of batch b, of ``batch`` triangles.
+
+    ``counts`` holds the next place of each bin: from 0 when counting (``entries`` None), into ``entries`` when filling.
+    """
+    first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
+    scratch, boxes = _new_scratch(counts.size, events is not None), _new_boxes()
+    read = write = np.int64(0)  # literals that change in a loop have their callees compiled twice
+    while True:
+        while write - read < BLOCK and first < end:
+            first, write = _read_step(given, scratch.ring, read, write, first, end, events)
+        m = min(BLOCK, write - read)
+        for start in range(read, read + m, WARP):
+            lanes = min(WARP, read + m - start)
+            path, largest = _load_warp(given, scratch.ring, start, lanes, boxes)
+            if events is not None:
+                scratch.warps[0] += 1
+                _count_warp(given, path, largest, boxes, lanes, scratch, start, events)
+            _emit_warp(given, path, boxes, lanes, scratch, start, counts, entries, events)
+        if events is not None:
+            events[BinRasterEvent.ROUNDS] += 1
+            events[BinRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
+            events[BinRasterEvent.TRIANGLES] += m
+            _count_segments(counts, scratch.before, events)
+        read += m
+        if read == write and first >= end:
+            break
+    if events is not None:
+        events[BinRasterEvent.BATCHES] += 1
+        events[BinRasterEvent.CLOSED_SEGMENTS] += np.count_nonzero(counts)
+        _count_atomic(events, 1)

@@ -1,0 +1,220 @@
+"""Coarse raster: the queues of bins to queues by tile of 8 x 8 pixels, in input order (Laine & Karras 2011, section 5).
+
+As many blocks of 512 threads as the machine has SMs draw bins from an atomic counter, the fullest bin first. A block
+merges the bin's 16 streams, takes 512 entries a round, finds the tiles that each touches, and appends them to the
+tiles' lists of segments of 32 entries.
+
+Which block draws which bin, and so the order of tiles among those of other bins, is decided by the machine; here
+bins complete in the order in which they are drawn. No picture depends on it.
+"""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts
+from simulator.stages.borrow import row_of
+from simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
+from simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
+from simulator.stages.laine2011.coarse_raster_bin import (
+    BIN_TILES,
+    BLOCK,
+    ENTRY_BYTES,
+    TILE_SEGMENT,
+    TILES,
+    CoarseInput,
+    _play_bin,
+)
+from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from simulator.work import Work
+
+TILE_PIXELS = 8
+SEGMENT_BYTES = TILE_SEGMENT * ENTRY_BYTES + 8  # entries, next and count
+SHARED_BYTES = 44320
+WARPS = BLOCK // WARP
+SORT_TOTAL = (1 << 24) - 1  # bins are sorted by the low 24 bits of their total
+
+
+class TileQueues(NamedTuple):
+    """The queues of all tiles, as fine raster reads them."""
+
+    starts: NDArray[
+        np.int64
+    ]  # (tiles + 1,) where a tile's entries start, tile = column + row * tiles_x from the bottom
+    entries: NDArray[np.int32]  # (emits,) slot of header and data, in exact input order
+    active: NDArray[np.int32]  # (active,) tiles in the order in which fine raster draws them
+    tiles_x: int
+    tiles_y: int
+
+
+@njit(cache=True, nogil=True)
+def _play_part(part, _parts, given, order, counts, entries, events):
+    """Play one bin, with its own rows: see ``_play_bin``."""
+    _play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
+
+
+def coarse_raster(
+    bin_queues: BinQueues,
+    setup: Any,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Literal["1.1", "nvdiffrast"] = "1.1",
+    deferred_clear: bool = True,
+    counting: bool = True,
+    capacity: int | None = None,
+) -> tuple[TileQueues, Work, dict[str, Any]]:
+    """Queue every sub-triangle in the tiles that it touches.
+
+    Parameters
+    ----------
+    bin_queues : BinQueues
+        What bin raster made.
+    setup : Setup
+        What triangle setup made: ``headers``, ``misc``.
+    width, height : int
+        Viewport in pixels, at most 2048 each.
+    simt : Simt
+        The machine's shape; one block an SM.
+    release : {"1.1", "nvdiffrast"}
+        Both queue and count the same.
+    deferred_clear : bool
+        A clear is pending: empty bins and tiles are handed on too.
+    counting : bool
+        Fill the work table.
+    capacity : int, optional
+        Tile segments that the buffer holds; without it there is always room.
+
+    Returns
+    -------
+    queues : TileQueues
+    work : Work
+        The first rows, one a block, are its start and its last draw, which finds no bin; then one row a bin, in the
+        order in which they are drawn.
+    facts : dict
+        ``counters`` by the authors' names as (N, D), ``num_tile_segments``, ``bytes``, ``overflow``.
+
+    Raises
+    ------
+    TilestampError
+        For a viewport or a machine that the original cannot use.
+    """
+    check_viewport(width, height, release)
+    given = _input(bin_queues, setup, width, height, simt)
+    order = bin_order(np.diff(bin_queues.starts), deferred_clear)
+    bins = len(bin_queues.starts) - 1
+    counts = np.zeros((bins, TILES), np.int64)
+    events = np.zeros((len(order), len(CoarseRasterEvent)), np.int64) if counting else None
+    bin_tiles = _bin_tiles(given, bins)
+    in_frame = bin_tiles >= 0
+    for_parts(_play_part, len(order), given, order, counts, None, events)
+    starts = np.zeros(given.tiles_x * given.tiles_y + 1, np.int64)
+    starts[bin_tiles[in_frame] + 1] = counts[in_frame]
+    np.cumsum(starts, out=starts)
+    entries = np.empty(starts[-1], np.int32)
+    for_parts(_play_part, len(order), given, order, np.where(in_frame, starts[bin_tiles], 0), entries, None)
+    used = in_frame[order] & (deferred_clear | (counts[order] > 0))
+    active = bin_tiles[order][used].astype(np.int32)
+    segments = int((-(-counts // TILE_SEGMENT)).sum())
+    work = _work(events, used.sum(axis=1), simt, given, segments)
+    facts: dict[str, Any] = {
+        "num_tile_segments": segments,
+        "bytes": segments * SEGMENT_BYTES,
+        "overflow": capacity is not None and segments > capacity,
+        "counters": _counters(work) if counting else {},
+    }
+    return TileQueues(starts, entries, active, given.tiles_x, given.tiles_y), work, facts
+
+
+def bin_order(totals: NDArray[np.int64], deferred_clear: bool) -> NDArray[np.int64]:
+    """Bins in the order in which blocks draw them: the fullest first, equal ones by index; empty ones only to clear."""
+    keys = (~totals & SORT_TOTAL) << 8 | np.arange(len(totals))
+    order = np.argsort(keys)
+    return order if deferred_clear else order[totals[order] > 0]
+
+
+def initial_capacity(triangles: int, width: int, height: int) -> int:
+    """Tile segments that the original makes room for before the first attempt (section 7)."""
+    tiles = -(-width // TILE_PIXELS) * -(-height // TILE_PIXELS)
+    return max(tiles, -(-triangles // TILE_SEGMENT)) + 4096
+
+
+def _input(queues: BinQueues, setup: Any, width: int, height: int, simt: Simt) -> CoarseInput:
+    return CoarseInput(
+        queues.starts,
+        queues.entries,
+        queues.batch_counts,
+        setup.headers,
+        setup.misc,
+        8 * width,
+        8 * height,
+        queues.bins_x,
+        -(-width // TILE_PIXELS),
+        -(-height // TILE_PIXELS),
+        transaction_bytes(simt, "coarse_raster"),
+    )
+
+
+def _bin_tiles(given: CoarseInput, bins: int) -> NDArray[np.int64]:
+    """Index in the frame of each bin's tiles, (bins, 256); -1 outside the frame."""
+    b, tile = np.arange(bins)[:, None], np.arange(TILES)[None]
+    x = b % given.bins_x * BIN_TILES + tile % BIN_TILES
+    y = b // given.bins_x * BIN_TILES + tile // BIN_TILES
+    return np.where((x < given.tiles_x) & (y < given.tiles_y), x + y * given.tiles_x, -1)
+
+
+def _work(
+    events: NDArray[np.int64] | None, active: NDArray[np.int64], simt: Simt, given: CoarseInput, segments: int
+) -> Work:
+    """Put the blocks' own rows in front, and name the buffers."""
+    E = CoarseRasterEvent
+    rest = np.zeros((simt.sms, len(E)), np.int64)
+    if events is None:
+        events = np.zeros((0, len(E)), np.int64)
+    else:
+        rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
+        rest[:, [E.LOAD, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]] = _sort_loads(len(given.starts) - 1, given.segment_bytes)
+        events[:, E.ACTIVE_TILES] = active
+    table = np.vstack([rest, events])
+    entries = len(given.entries) * ENTRY_BYTES
+    streams = (
+        Stream("bin_queues", "load", entries, entries),
+        Stream(
+            "headers", "load", max(int(table[:, E.LOAD_BYTES].sum()) - entries, 0), len(given.headers) * HEADER_BYTES
+        ),
+        Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
+    )
+    return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
+
+
+def _sort_loads(bins: int, segment_bytes: int) -> tuple[int, int, int]:
+    """Count loads, transactions and bytes of a block that sorts the bins: two a warp, and 16 totals of each bin."""
+    loads = 2 * WARPS + STREAMS * -(-bins // WARP)
+    lines = (
+        STREAMS * -(-bins * STREAMS * ENTRY_BYTES // segment_bytes) // max(STREAMS * ENTRY_BYTES // segment_bytes, 1)
+    )
+    return loads, 2 * WARPS + lines, (2 * WARPS + lines) * segment_bytes
+
+
+def _counters(work: Work) -> dict[str, tuple[int, int]]:
+    """Return the profiler's counters, by the authors' names: N and D, whose ratio they print (D = 0: N itself)."""
+    E = CoarseRasterEvent
+    rounds, bins, warps = work.total(E.ROUNDS), work.total(E.BINS), work.total(E.ROUND_WARPS)
+    return {
+        "CoarseRaster / Bins": (bins, 0),
+        "CoarseRaster / Rounds / Bin": (rounds, bins),
+        "CoarseRaster / Merge / Round": (work.total(E.MERGES), rounds),
+        "CoarseRaster / Triangles / Round": (work.total(E.TRIANGLES), rounds),
+        "CoarseRaster / Tiles / Round": (work.total(E.TILES_TOUCHED), rounds),
+        "CoarseRaster / Emits / Round": (work.total(E.EMITS), rounds),
+        "CoarseRaster / Allocs / Round": (work.total(E.SEGMENTS), rounds),
+        "CoarseRaster / Emits / Triangle": (work.total(E.EMITS), work.total(E.TRIANGLES)),
+        "CoarseRaster / Case A": (100 * work.total(E.CASE_A_WARPS), warps),
+        "CoarseRaster / Case B": (100 * work.total(E.CASE_B_WARPS), warps),
+        "CoarseRaster / Case C": (100 * work.total(E.CASE_C_WARPS), warps),
+    }

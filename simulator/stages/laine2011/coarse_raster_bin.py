@@ -1,0 +1,232 @@
+"""One bin of coarse raster: merge, rounds of 512 and the three cases (Laine & Karras 2011, section 5).
+
+A bin is what a block draws from its queue. Its streams are merged segment by segment into input order; a round takes
+512 entries, and each warp sets the bits of the tiles that its triangles touch by the cheapest of three ways. As in
+bin raster a bin is played twice, to count and to fill.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from simulator.stages.laine2011.bin_raster_cover import (
+    SINGLE_TRIANGLE,
+    TILE_SIDE_LOG2,
+    WARP,
+    _entry_slot,
+    _header_load,
+    _lane_box,
+    _lane_edges,
+    _new_boxes,
+    _small_votes,
+    _touches,
+    _walk_votes,
+)
+from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+
+BLOCK = 512  # threads, and entries of a round
+BIN_SEGMENT = 512  # entries
+TILE_SEGMENT = 32  # entries
+ENTRY_BYTES = 4
+BIN_TILES = 16  # in each axis
+TILES = BIN_TILES * BIN_TILES
+MASK_ROW = TILES + 1  # words: one warp's masks in shared memory
+CASE_A, CASE_B, CASE_C = 0, 1, 2  # of a warp: small boxes, boxes close together, boxes far apart
+
+
+class CoarseInput(NamedTuple):
+    """What bin raster and triangle setup leave, and the grid of tiles."""
+
+    starts: NDArray[np.int64]
+    entries: NDArray[np.int32]
+    batch_counts: NDArray[np.int64]
+    headers: NDArray[np.int16]
+    misc: NDArray[np.uint32]
+    half_x: int  # sub-pixels from the lower-left corner to the centre of the viewport
+    half_y: int
+    bins_x: int
+    tiles_x: int
+    tiles_y: int
+    segment_bytes: int  # of the machine's memory transactions
+
+
+class Place(NamedTuple):
+    """One bin in the frame."""
+
+    first_tile_x: int
+    first_tile_y: int
+    last_x: int  # last tile of the bin that lies in the frame
+    last_y: int
+    move_x: int  # from centre-relative sub-pixels to the bin's corner
+    move_y: int
+
+
+@njit(cache=True, nogil=True)
+def _place(given, b):
+    bx, by = b % given.bins_x, b // given.bins_x
+    return Place(
+        bx * BIN_TILES,
+        by * BIN_TILES,
+        min(given.tiles_x - bx * BIN_TILES, BIN_TILES) - 1,
+        min(given.tiles_y - by * BIN_TILES, BIN_TILES) - 1,
+        given.half_x - bx * BIN_TILES * (1 << TILE_SIDE_LOG2),
+        given.half_y - by * BIN_TILES * (1 << TILE_SIDE_LOG2),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _load_warp(given, place, first, lanes, boxes):
+    """Boxes of a warp's triangles; returns its case, the tiles of the largest box and those of the union box."""
+    small = True
+    largest = 1
+    low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
+    for lane in range(lanes):
+        slot = _entry_slot(np.int64(given.entries[first + lane]), given.misc)
+        boxes.slot[lane] = slot
+        header = given.headers[slot]
+        _lane_box(boxes, lane, header, place.move_x, place.move_y, TILE_SIDE_LOG2, place.last_x, place.last_y)
+        x, y, columns, rows = boxes.box[lane]
+        small &= columns <= 2 and rows <= 2
+        largest = max(largest, columns * rows)
+        low_x, low_y = min(low_x, x), min(low_y, y)
+        high_x, high_y = max(high_x, x + columns), max(high_y, y + rows)
+    union = (high_x - low_x) * (high_y - low_y)
+    if small:
+        return CASE_A, largest, union
+    for lane in range(lanes):
+        _lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
+    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union
+
+
+@njit(cache=True, nogil=True)
+def _emit_warp(case, boxes, lanes, counts, queues):
+    """Append a warp's triangles to the tiles that they touch."""
+    for lane in range(lanes):
+        box = boxes.box[lane]
+        for row in range(box[3]):
+            for column in range(box[2]):
+                if case == CASE_A or _touches(boxes, lane, column, row):
+                    tile = box[0] + column + (box[1] + row) * BIN_TILES
+                    if queues is not None:
+                        queues[counts[tile]] = boxes.slot[lane]
+                    counts[tile] += 1
+
+
+@njit(cache=True, nogil=True)
+def _count_warp(given, case, largest, union, boxes, lanes, first, events):
+    """Count what a warp's loads and its case cost."""
+    area, indirect = 0, False
+    for lane in range(lanes):
+        area += boxes.box[lane, 2] * boxes.box[lane, 3]
+        indirect |= given.entries[first + lane] & 7 != SINGLE_TRIANGLE
+    events[CoarseRasterEvent.BOX_TILES] += area
+    events[CoarseRasterEvent.INDIRECT_WARPS] += indirect
+    ors, replays = 0, 0
+    if case == CASE_A:
+        events[CoarseRasterEvent.CASE_A_WARPS] += 1
+        ors, replays = _small_votes(boxes, lanes, BIN_TILES)
+    elif case == CASE_B:
+        events[CoarseRasterEvent.CASE_B_WARPS] += 1
+        events[CoarseRasterEvent.CASE_B_STEPS] += union
+    else:
+        events[CoarseRasterEvent.CASE_C_WARPS] += 1
+        events[CoarseRasterEvent.CASE_C_STEPS] += largest
+        events[CoarseRasterEvent.CASE_C_LANE_STEPS] += area
+        ors, replays = _walk_votes(boxes, lanes, largest, BIN_TILES)
+    events[CoarseRasterEvent.SHARED_ATOMIC] += ors
+    events[CoarseRasterEvent.BANK_REPLAYS] += replays
+    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
+
+
+@njit(cache=True, nogil=True)
+def _count_load(events, loads, segments, size):
+    events[CoarseRasterEvent.LOAD] += loads
+    events[CoarseRasterEvent.LOAD_TRANSACTIONS] += segments
+    events[CoarseRasterEvent.LOAD_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_atomic(events, executed):
+    """One thread's global atomic."""
+    events[CoarseRasterEvent.ATOMIC] += executed
+    events[CoarseRasterEvent.ATOMIC_LANES] += executed
+    events[CoarseRasterEvent.ATOMIC_REQUESTS] += executed
+    events[CoarseRasterEvent.ATOMIC_DEPTH] += executed
+
+
+@njit(cache=True, nogil=True)
+def _count_emits(given, counts, before, events):
+    """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
+    fresh, touched, emits, stores = 0, 0, 0, 0
+    for tile in range(counts.size):
+        place, end = before[tile], counts[tile]
+        before[tile] = end
+        touched += end > place
+        fresh += (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
+        while place < end:  # the part of a tile's emits that one warp writes
+            part = min(end - place, WARP - emits % WARP)
+            first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
+            stores += last // given.segment_bytes - first // given.segment_bytes + 1
+            place, emits = place + part, emits + part
+    events[CoarseRasterEvent.TILES_TOUCHED] += touched
+    events[CoarseRasterEvent.EMITS] += emits
+    events[CoarseRasterEvent.EMIT_STEPS] += (emits + BLOCK - 1) // BLOCK
+    events[CoarseRasterEvent.EMIT_WARPS] += (emits + WARP - 1) // WARP
+    events[CoarseRasterEvent.SEGMENTS] += fresh
+    events[CoarseRasterEvent.ALLOC_ROUNDS] += fresh > 0
+    events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
+    events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
+    _count_atomic(events, fresh > 0)
+
+
+@njit(cache=True, nogil=True)
+def _count_merge(given, b, events):
+    """Count the merges: a round takes whole segments until more than 512 entries wait, or none is left."""
+    write, read, batch, taken = 0, 0, 0, 0
+    total = given.starts[b + 1] - given.starts[b]
+    while read < total:
+        while write - read <= BLOCK:
+            events[CoarseRasterEvent.MERGES] += 1
+            while batch < given.batch_counts.shape[0] and taken == given.batch_counts[batch, b]:
+                batch, taken = batch + 1, 0
+            if batch == given.batch_counts.shape[0]:
+                break
+            size = min(given.batch_counts[batch, b] - taken, BIN_SEGMENT)
+            taken, write = taken + size, write + size
+            warps = (size + WARP - 1) // WARP
+            events[CoarseRasterEvent.MERGE_WARPS] += warps
+            _count_load(events, 2, 2, 2 * given.segment_bytes)  # its count and the link to the next
+            segments = (size * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes
+            _count_load(events, warps, segments, segments * given.segment_bytes)
+        read += min(BLOCK, write - read)
+
+
+@njit(cache=True, nogil=True)
+def _play_bin(given, b, counts, queues, events):
+    """Find the tiles of a bin's entries.
+
+    ``counts`` (256,) holds the next place of each tile: from 0 when counting (``queues`` None), into ``queues`` when
+    filling.
+    """
+    boxes, place = _new_boxes(), _place(given, b)
+    before = np.zeros(TILES, np.int64)
+    start, end = given.starts[b], given.starts[b + 1]
+    if events is not None:
+        _count_merge(given, b, events)
+        events[CoarseRasterEvent.BINS] += 1
+        events[CoarseRasterEvent.TRIANGLES] += end - start
+        _count_atomic(events, 2)  # its draw, and room among the active tiles
+    for read in range(start, end, BLOCK):
+        m = min(BLOCK, end - read)
+        for first in range(read, read + m, WARP):
+            lanes = min(WARP, read + m - first)
+            case, largest, union = _load_warp(given, place, first, lanes, boxes)
+            if events is not None:
+                _count_warp(given, case, largest, union, boxes, lanes, first, events)
+            _emit_warp(case, boxes, lanes, counts, queues)
+        if events is not None:
+            events[CoarseRasterEvent.ROUNDS] += 1
+            events[CoarseRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
+            _count_emits(given, counts, before, events)

@@ -1,0 +1,214 @@
+"""Fine raster, the tile in hand: pixels in shared memory and a queue of fragments (Laine & Karras 2011, section 6)."""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from models.coalescing import transactions
+from simulator.stages.laine2011.coverage import pixel_mask, square_mask
+from simulator.stages.laine2011.exact import lowest_bit, popcount
+from simulator.stages.laine2011.subtriangle import DEPTH_MAX
+from simulator.stages.laine2011.triangle_setup_paths import Setup
+
+TILE = 8  # pixels
+PIXELS = TILE * TILE
+SEGMENT = 32  # entries of a tile's list that are read together
+QUEUE = 64  # triangles with fragments left
+WARP = 32
+HEADER_BYTES = 16
+
+
+class FineRasterEvent(IntEnum):
+    """Events of one tile, drawn by one warp. LANES are active lanes; all else counts warp executions or pixels."""
+
+    SEGMENTS = 0  # reads of up to 32 list entries: header, early z and coverage each
+    ENTRY_LANES = 1
+    EARLY_Z_LANES = 2  # entries tested against the tile's largest depth
+    EARLY_Z_KILLS = 3
+    COVERAGE_LANES = 4  # masks computed
+    EMPTY_MASKS = 5
+    ZMAX_UPDATES = 6  # maxima over the tile's 64 depths
+    FRAGMENT_ROUNDS = 7
+    FRAGMENT_LANES = 8  # fragments distributed
+    Z_KILLS = 9
+    MSAA_KILLS = 10  # fragments without a covered sample
+    SHADE_ROUNDS = 11  # fragment rounds with a survivor
+    SHADE_LANES = 12
+    ROP_STEPS = 13  # rounds of conflict resolution, by the pixel with most of them
+    ROP_LANES = 14  # writes that took effect
+    BLEND_LANES = 15  # survivors, once for each sample that any of them wrote: the D of "blend attempt rounds"
+    BLEND_ROUND_LANES = 16  # the same times the rounds: its N
+    SAMPLE_TESTS = 17  # points tested: 64 for each mask, and the samples of each fragment
+    SAMPLE_HITS = 18
+    SHARED_ATOMIC = 19
+    BANK_REPLAYS = 20  # passes that lanes of one shared atomic at one pixel add
+    TILE_LOADS = 21
+    TILE_STORES = 22
+    ATOMIC = 23  # draws from the tile counter
+    ATOMIC_LANES = 24
+    ATOMIC_REQUESTS = 25
+    ATOMIC_DEPTH = 26
+    LOAD_TRANSACTIONS = 27
+    LOAD_BYTES = 28
+    STORE_TRANSACTIONS = 29
+    STORE_BYTES = 30
+
+
+class Draw(NamedTuple):
+    """One draw as the kernels take it."""
+
+    log_samples: int
+    later_wins: bool  # nvdiffrast: of equal depths the later triangle shows
+    depth: bool
+    blend: bool
+    write_color: bool
+    interpolate: bool
+    clear: bool  # deferred clear: tiles start from the clear values
+    clear_color: int
+    clear_depth: int
+    half_width: int  # 1/16 pixel
+    half_height: int
+    tiles_x: int
+    coalescing: int
+
+
+class Tile(NamedTuple):
+    """Scratch of one warp; pixel p of the tile is bit p of a coverage mask, its sample i at p + 64 * i."""
+
+    depth: np.ndarray  # (samples * 64,) int64
+    color: np.ndarray  # (samples * 64,) int64, RGBA from the low byte up
+    ids: np.ndarray  # (samples * 64,) int64
+    zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only
+    chain: np.ndarray  # (64,) int64: writes of the current round
+    slots: np.ndarray  # (96,) int64: queue of triangles ...
+    masks: np.ndarray  # (96,) uint64: ... and the fragments that they have left
+    state: np.ndarray  # (7,) int64, see below
+    pixel: np.ndarray  # (32,) int64: fragments of a round
+    slot: np.ndarray  # (32,) int64
+    mask: np.ndarray  # (32,) int64: covered samples
+    addresses: np.ndarray  # (32,) int64
+
+
+HEAD, TAIL, FRAGMENTS, NEXT, END, ZMAX, UPDATE = range(7)  # columns of Tile.state
+
+
+@njit(cache=True, nogil=True)
+def new_tile(samples: int) -> Any:
+    """Scratch for one warp."""
+    many, i64 = samples * PIXELS, np.int64
+    return Tile(
+        np.empty(many, i64), np.empty(many, i64), np.empty(many, i64), np.empty(PIXELS, i64), np.zeros(PIXELS, i64),
+        np.empty(QUEUE + SEGMENT, i64), np.empty(QUEUE + SEGMENT, np.uint64), np.zeros(7, i64),
+        np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def corner(tile_index: int, draw: Draw) -> Any:
+    """Lower left corner of a tile in the units of headers."""
+    left = (tile_index % draw.tiles_x) * (16 * TILE) - draw.half_width
+    bottom = (tile_index // draw.tiles_x) * (16 * TILE) - draw.half_height
+    return left, bottom
+
+
+@njit(cache=True, nogil=True)
+def update_zmax(depths: Any, state: Any, row: Any) -> None:
+    """Take the tile's largest depth anew, if a fragment has covered a pixel that had it."""
+    if state[UPDATE]:
+        state[ZMAX] = depths[:PIXELS].max()
+        state[UPDATE] = 0
+        if row is not None:
+            row[6] += 1
+
+
+@njit(cache=True, nogil=True)
+def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
+    """Count a load of ``size`` bytes by each of n lanes at ``tile.addresses``."""
+    count, read = transactions(tile.addresses, n, size, draw.coalescing)
+    row[27] += count
+    row[28] += read
+
+
+@njit(cache=True, nogil=True)
+def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
+    """Read up to 32 entries, cull them by depth, and queue those with a non-empty mask."""
+    state = tile.state
+    first, last = state[NEXT], min(state[NEXT] + SEGMENT, state[END])
+    state[NEXT] = last
+    killed = empty = 0
+    for k in range(first, last):
+        slot = np.int64(entries[k])
+        if row is not None:
+            tile.addresses[k - first] = slot * HEADER_BYTES
+        if draw.depth:
+            nearest = np.int64(setup.misc[slot]) & 0xFFFFF000
+            if nearest > state[ZMAX] or (nearest == state[ZMAX] and not draw.later_wins):
+                killed += 1
+                continue
+        header = setup.headers[slot]
+        mask = square_mask(header, left, bottom) if draw.log_samples > 0 else pixel_mask(header, left, bottom)
+        if mask == np.uint64(0):
+            empty += 1
+            continue
+        tile.slots[state[TAIL]] = slot
+        tile.masks[state[TAIL]] = mask
+        state[TAIL] += 1
+        state[FRAGMENTS] += popcount(mask)
+    if row is not None:
+        n = last - first
+        row[0] += 1
+        row[1] += n
+        row[2] += n if draw.depth else 0
+        row[3] += killed
+        row[4] += n - killed
+        row[5] += empty
+        row[17] += PIXELS * (n - killed)
+        row[27] += 1 if draw.coalescing != 3 else 4  # the entries, 128 bytes in a line of their own
+        row[28] += 4 * SEGMENT
+        row[27] += 2  # the segment's count and the next segment
+        row[28] += 2 * (HEADER_BYTES * 2 if draw.coalescing != 2 else 128)
+        count_gather(tile, n, HEADER_BYTES, draw, row)
+
+
+@njit(cache=True, nogil=True)
+def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
+    """Read on until 32 fragments are queued or the list ends."""
+    state = tile.state
+    queued = state[TAIL] - state[HEAD]
+    for i in range(queued):
+        tile.slots[i] = tile.slots[state[HEAD] + i]
+        tile.masks[i] = tile.masks[state[HEAD] + i]
+    state[HEAD], state[TAIL] = 0, queued
+    while state[FRAGMENTS] < WARP and state[NEXT] < state[END]:
+        read_segment(setup, entries, draw, tile, left, bottom, row)
+
+
+@njit(cache=True, nogil=True)
+def take(tile: Tile) -> Any:
+    """Move up to 32 fragments in order from the queue to the lanes; returns how many."""
+    state = tile.state
+    n = 0
+    while n < WARP and state[HEAD] < state[TAIL]:
+        mask = tile.masks[state[HEAD]]
+        slot = tile.slots[state[HEAD]]
+        while n < WARP and mask != np.uint64(0):
+            tile.pixel[n] = lowest_bit(mask)
+            tile.slot[n] = slot
+            mask &= mask - np.uint64(1)
+            n += 1
+        tile.masks[state[HEAD]] = mask
+        if mask == np.uint64(0):
+            state[HEAD] += 1
+    state[FRAGMENTS] -= n
+    return n
+
+
+@njit(cache=True, nogil=True)
+def start_tile(tile: Tile, begin: int, end: int) -> None:
+    """Empty the queue for a tile whose list is entries begin..end-1."""
+    tile.state[:] = 0
+    tile.state[NEXT] = begin
+    tile.state[END] = end
+    tile.state[ZMAX] = DEPTH_MAX

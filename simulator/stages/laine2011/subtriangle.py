@@ -1,0 +1,194 @@
+"""One sub-triangle: snapping, culls, and the header and data record that later stages read (cudaraster 1.1, setup)."""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from simulator.stages.laine2011.exact import fma, round_to_int32, round_to_uint32, wrap_int32
+from simulator.stages.laine2011.plane_equation import plane_equation
+
+SUBPIXELS = 16  # snapped positions are multiples of 1/16 pixel
+DEPTH_ERROR = 2200  # largest error of an evaluated depth plane, in depth units, at one sample a pixel
+DEPTH_MIN = DEPTH_ERROR * 8
+DEPTH_MAX = 2**32 - 1 - DEPTH_MIN  # the cleared depth
+BARYCENTRIC_SCALE = np.float32(2**26)
+_DEPTH_SCALE = np.float32(2147465984.0)  # half the depth range
+_DEPTH_BASE = np.float32(2147483648.0)
+_LOW = 0xFFFFFFFF
+
+
+class Outcome(IntEnum):
+    """What became of a triangle before it is stored."""
+
+    KEPT = 0
+    BACKFACE = 1  # or without area
+    BETWEEN = 2  # its box holds no sample, or it misses the one or two that the box holds
+
+
+class View(NamedTuple):
+    """Viewport and switches of one draw, as kernels take them."""
+
+    half_width: int  # 1/16 pixel
+    half_height: int
+    scale_x: np.float32
+    scale_y: np.float32
+    log_samples: int
+    guard_band: bool  # release 1.1; nvdiffrast clips whatever leaves the frustum
+    cull_backfaces: bool
+    depth: bool
+    interpolate: bool
+
+
+class Corner(NamedTuple):
+    """A vertex of a sub-triangle: scalars only, so that compiled code keeps it in registers."""
+
+    x: np.float32  # clip space
+    y: np.float32
+    z: np.float32
+    w: np.float32
+    u: np.float32  # barycentrics towards vertices 1 and 2 of the input triangle
+    v: np.float32
+    inverse_w: np.float32
+    sx: int  # snapped, 1/16 pixel from the viewport's centre
+    sy: int
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
+    """Project a clip position to the screen and round it to 1/16 pixel."""
+    inverse = np.float32(1) / w
+    sx = round_to_int32((x * inverse) * view.scale_x)
+    sy = round_to_int32((y * inverse) * view.scale_y)
+    return Corner(x, y, z, w, u, v, inverse, sx, sy)
+
+
+@njit(cache=True, nogil=True)
+def snapped_area(a: Corner, b: Corner, c: Corner) -> Any:
+    """Twice the area in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it."""
+    return wrap_int32((b.sx - a.sx) * (c.sy - a.sy) - (b.sy - a.sy) * (c.sx - a.sx))
+
+
+@njit(cache=True, nogil=True)
+def _holds_site(a: Corner, b: Corner, c: Corner, x: int, y: int, sign: int) -> Any:
+    ax, ay, bx, by, cx, cy = a.sx - x, a.sy - y, b.sx - x, b.sy - y, c.sx - x, c.sy - y
+    ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
+    return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
+
+
+@njit(cache=True, nogil=True)
+def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> Any:
+    """Whether the triangle surely holds no site of the sample grid."""
+    q = SUBPIXELS >> view.log_samples
+    bx, by = view.half_width - q // 2, view.half_height - q // 2
+    lox = wrap_int32(min(a.sx, b.sx, c.sx) + q - 1 + bx) & -q
+    hix = wrap_int32(max(a.sx, b.sx, c.sx) + bx) & -q
+    loy = wrap_int32(min(a.sy, b.sy, c.sy) + q - 1 + by) & -q
+    hiy = wrap_int32(max(a.sy, b.sy, c.sy) + by) & -q
+    if lox > hix or loy > hiy:
+        return True
+    spread = (hix - lox) + (hiy - loy)
+    if spread > q or _holds_site(a, b, c, lox - bx, loy - by, sign):
+        return False
+    return spread == 0 or not _holds_site(a, b, c, hix - bx, hiy - by, sign)
+
+
+@njit(cache=True, nogil=True)
+def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
+    """Outcome of the culls that follow snapping, and the signed area."""
+    area = snapped_area(a, b, c)
+    if area == 0 or (area < 0 and view.cull_backfaces):
+        return 1, area
+    if _between_samples(a, b, c, view, 1 if area > 0 else -1):
+        return 2, area
+    return 0, area
+
+
+@njit(cache=True, nogil=True)
+def _flips(a: Corner, b: Corner) -> Any:
+    """How the coverage table is turned for the edge a -> b (bits: flip y, flip x, swap, complement)."""
+    dx, dy = b.sx - a.sx, b.sy - a.sy
+    flips = 0
+    if dy > 0 or (dy == 0 and dx <= 0):
+        flips ^= 0b1011
+    if dx > 0:
+        flips ^= 0b0011
+    if abs(dx) < abs(dy):
+        flips ^= 0b0101
+    return flips
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lesser(a: Any, b: Any) -> Any:
+    """Minimum that ignores NaN, as CUDA's does."""
+    return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _depth_at(a: Corner) -> Any:
+    return fma(a.z * _DEPTH_SCALE, a.inverse_w, _DEPTH_BASE)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
+    """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
+    headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)
+    headers[slot, 2], headers[slot, 3] = np.int16(b.sx & 0xFFFF), np.int16(b.sy & 0xFFFF)
+    headers[slot, 4], headers[slot, 5] = np.int16(c.sx & 0xFFFF), np.int16(c.sy & 0xFFFF)
+    word = np.int64(_flips(a, b) << 8 | _flips(b, c) << 4 | _flips(c, a))
+    if view.depth:
+        nearest = _lesser(_lesser(_depth_at(a), _depth_at(b)), _depth_at(c))
+        word |= round_to_uint32(nearest - np.float32(DEPTH_ERROR << view.log_samples)) & 0xFFFFF000
+    misc[slot] = np.uint32(word)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def store_depth_plane(
+    a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
+) -> None:
+    """Write x, y, base of the depth plane, and how far depth can vary inside a pixel (with several samples)."""
+    s = view.log_samples
+    half = 1 << (3 - s)
+    zx, zy, zb = plane_equation(
+        _depth_at(a), _depth_at(b), _depth_at(c), a.sx + view.half_width - half, a.sy + view.half_height - half,
+        b.sx - a.sx, b.sy - a.sy, c.sx - a.sx, c.sy - a.sy, mantissa, shift, s,
+    )  # fmt: skip
+    planes[slot, 0], planes[slot, 1], planes[slot, 2] = np.uint32(zx), np.uint32(zy), np.uint32(zb)
+    if s > 0:
+        slope = abs(wrap_int32(zx)) + abs(max(wrap_int32(zy), -2147483647))
+        planes[slot, 3] = np.uint32(min(slope << (s - 1), _LOW))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _store_plane(
+    u0: Any,
+    u1: Any,
+    u2: Any,
+    a: Corner,
+    b: Corner,
+    c: Corner,
+    mantissa: int,
+    shift: int,
+    view: View,
+    planes: Any,
+    slot: int,
+    at: int,
+) -> None:
+    x, y, base = plane_equation(
+        u0, u1, u2, a.sx + view.half_width, a.sy + view.half_height,
+        b.sx - a.sx, b.sy - a.sy, c.sx - a.sx, c.sy - a.sy, mantissa, shift, view.log_samples + 1,
+    )  # fmt: skip
+    planes[slot, at], planes[slot, at + 1], planes[slot, at + 2] = np.uint32(x), np.uint32(y), np.uint32(base)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def store_attribute_planes(
+    a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
+) -> None:
+    """Write the planes of 1/w, u/w and v/w."""
+    scale = min(a.w, b.w, c.w) * BARYCENTRIC_SCALE
+    w0, w1, w2 = scale * a.inverse_w, scale * b.inverse_w, scale * c.inverse_w
+    _store_plane(w0, w1, w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(4))
+    _store_plane(a.u * w0, b.u * w1, c.u * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(7))
+    _store_plane(a.v * w0, b.v * w1, c.v * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(10))

@@ -1,0 +1,287 @@
+"""Triangle setup: one thread an input triangle, culls, clips, snaps and writes sub-triangles (cudaraster, first stage).
+
+Two published releases: "1.1" (Laine & Karras 2011) has a guard band in x and y and culls backfaces; "nvdiffrast"
+(2022) clips whatever leaves the frustum and keeps backfaces unless told otherwise.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from models.launch import Stream
+from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
+from simulator.stages.borrow import borrow
+from simulator.stages.laine2011.subtriangle import View
+from simulator.stages.laine2011.triangle_setup_count import (
+    HEADER_BYTES,
+    INDEX_BYTES,
+    POSITION_BYTES,
+    TriangleSetupEvent,
+    count_lane,
+    count_warp,
+    new_counting,
+)
+from simulator.stages.laine2011.triangle_setup_paths import (
+    CLIPPED,
+    OUTSIDE,
+    Scratch,
+    Setup,
+    clip_and_store,
+    fast_path,
+    load_corners,
+    new_scratch,
+)
+from simulator.work import Work
+
+Release = Literal["1.1", "nvdiffrast"]
+
+BLOCK = 64  # threads, a triangle each
+WARP = 32
+SHARED_BYTES = 4608  # the clip polygons of 64 threads
+SLACK = 4096  # sub-triangle slots beyond one for each triangle, at first
+MAX_SUBTRIANGLES = 2**24
+MAX_SIZE = 2048  # pixels along an axis: 16 bins of 16 tiles of 8 pixels
+SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64 or 16
+_PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
+
+
+@njit(cache=True, nogil=True)
+def _setup_range(
+    begin: int,
+    end: int,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    simt: Simt,
+    out: Setup,
+    scratch: Scratch,
+    counting: Any,
+    table: Any,
+) -> None:
+    """All triangles of some whole blocks; those with two or more sub-triangles are only counted here."""
+    clip = scratch.clip
+    for warp in range(begin, end, WARP):
+        last = min(warp + WARP, end)
+        allocating = np.int64(0)  # a literal that changes in a loop has its callees compiled twice
+        if table is not None:
+            for i in range(counting.longest.size):
+                counting.longest[i] = 0
+        for t in range(warp, last):
+            out.first[t] = t
+            kept, fan, outcome = 0, 0, OUTSIDE
+            in_range = load_corners(positions, triangles, t, clip)
+            if in_range:
+                outcome = fast_path(clip, view, out, t, triangles)
+                kept = 1 if outcome == 0 else 0
+            if outcome == CLIPPED:
+                kept, fan = clip_and_store(scratch, view, out, -1, t, triangles)
+                allocating += 1 if kept >= 2 else 0
+            out.subtriangles[t] = kept
+            if table is not None:
+                counting.read[t - warp] = in_range
+                count_lane(table[warp // BLOCK], counting, outcome, kept, fan, scratch.steps)
+        if table is not None:
+            row = table[warp // BLOCK]
+            count_warp(row, allocating, counting, triangles, warp, last - warp, view, out, simt)
+
+
+@njit(cache=True, nogil=True)
+def _setup_part(
+    part: int, parts: int, positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any
+) -> None:
+    """Take a share of the blocks, through arrays without reference counts."""
+    blocks = (triangles.shape[0] + BLOCK - 1) // BLOCK
+    begin, end = blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles.shape[0])
+    scratch, counting = new_scratch(), new_counting()
+    positions, triangles, out, lent = borrow(positions), borrow(triangles), borrow(out), borrow(scratch)
+    _setup_range(begin, end, positions, triangles, view, simt, out, lent, borrow(counting), borrow(table))
+    scratch.steps[0] = counting.value[0] = 0  # the owners live to here
+
+
+@njit(cache=True, nogil=True)
+def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out: Setup) -> None:
+    """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
+    scratch = new_scratch()
+    clip = scratch.clip
+    for t in several:
+        load_corners(positions, triangles, t, clip)
+        out.misc[t] = out.first[t]
+        clip_and_store(scratch, view, out, out.first[t], t, triangles)
+
+
+def make_view(
+    width: int,
+    height: int,
+    *,
+    release: Release,
+    samples: int = 1,
+    cull_backfaces: bool | None = None,
+    depth: bool = True,
+    interpolate: bool = True,
+) -> View:
+    """Check the viewport and the switches of a draw, and put them in the form that kernels take."""
+    if release not in SUBTRIANGLE_BYTES:
+        raise TilestampError(f"release is {release!r}; there is '1.1' and 'nvdiffrast'")
+    if samples not in (1, 2, 4, 8) or (release == "nvdiffrast" and samples != 1):
+        raise TilestampError(f"{samples} samples a pixel: release 1.1 has 1, 2, 4 and 8, and nvdiffrast has 1")
+    if not (1 <= width <= MAX_SIZE and 1 <= height <= MAX_SIZE):
+        raise TilestampError(
+            f"size {width}x{height}: cudaraster draws 1 to {MAX_SIZE} pixels along an axis, as the original"
+        )
+    return View(
+        half_width=8 * width,
+        half_height=8 * height,
+        scale_x=np.float32(8 * width),
+        scale_y=np.float32(8 * height),
+        log_samples=samples.bit_length() - 1,
+        guard_band=release == "1.1",
+        cull_backfaces=release == "1.1" if cull_backfaces is None else cull_backfaces,
+        depth=depth,
+        interpolate=interpolate and release == "1.1",
+    )
+
+
+def check_mesh(positions: NDArray[Any], triangles: NDArray[Any], *, release: Release) -> None:
+    """Refuse arrays of other shapes and types, and indices that the release would not survive."""
+    if positions.ndim != 2 or positions.shape[1] != 4 or positions.dtype != np.float32:
+        raise TilestampError(
+            f"positions are {positions.dtype} {positions.shape}; float32 (V, 4) in clip space is needed"
+        )
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype != np.int32:
+        raise TilestampError(f"triangles are {triangles.dtype} {triangles.shape}; int32 (F, 3) is needed")
+    if len(triangles) > MAX_SUBTRIANGLES:
+        raise TilestampError(f"{len(triangles)} triangles: cudaraster takes at most {MAX_SUBTRIANGLES} a draw")
+    if release == "1.1" and len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
+        bad = int(np.flatnonzero(((triangles < 0) | (triangles >= len(positions))).any(axis=1))[0])
+        raise TilestampError(f"triangle {bad} has a vertex index out of range; the mesh has {len(positions)} vertices")
+
+
+def triangle_setup(
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Release,
+    samples: int = 1,
+    cull_backfaces: bool | None = None,
+    depth: bool = True,
+    interpolate: bool = True,
+    counting: bool = True,
+    capacity: int | None = None,
+) -> tuple[Setup, Work, dict[str, Any]]:
+    """Cull, clip and set up all triangles of one draw.
+
+    Parameters
+    ----------
+    positions : ndarray, (V, 4), float32
+        Clip space.
+    triangles : ndarray, (F, 3), int32
+    width, height : int
+        Viewport, pixels, at most 2048.
+    simt : Simt
+        Coalescing rule for the counts.
+    release : {"1.1", "nvdiffrast"}
+    samples : int
+        1, 2, 4 or 8 samples a pixel (nvdiffrast: 1).
+    cull_backfaces : bool or None
+        None: as published, on in 1.1, off in nvdiffrast.
+    depth, interpolate : bool
+        Whether the depth plane and the attribute planes are needed.
+    counting : bool
+        Off: the work table stays empty.
+    capacity : int or None
+        Slots; None: F + 4096. Where more are needed nothing is lost: ``facts["numSubtris"]`` says how many, and the
+        caller draws again.
+
+    Returns
+    -------
+    setup : Setup
+    work : Work
+        A row a block of 64 threads.
+    facts : dict
+        ``numSubtris``, ``capacity`` and ``overflow``.
+
+    Raises
+    ------
+    TilestampError
+        Shapes, types, sizes; for release 1.1 also indices out of range (nvdiffrast skips such triangles).
+    """
+    view = make_view(
+        width,
+        height,
+        release=release,
+        samples=samples,
+        cull_backfaces=cull_backfaces,
+        depth=depth,
+        interpolate=interpolate,
+    )
+    check_mesh(positions, triangles, release=release)
+    F = len(triangles)
+    out = _empty_setup(F, F, release)
+    table = np.zeros((-(-F // BLOCK) if counting else 0, len(TriangleSetupEvent)), np.int64)
+    with np.errstate(all="ignore"):
+        parts = parts_of(-(-F // BLOCK), _PART_BLOCKS)
+        for_parts(_setup_part, parts, positions, triangles, view, simt, out, table if counting else None)
+        several = np.flatnonzero(out.subtriangles >= 2)
+        counts = out.subtriangles[several].astype(np.int64)
+        needed = F + int(counts.sum())
+        capacity = F + SLACK if capacity is None else capacity
+        if len(several) and needed <= capacity:
+            out = _grown(out, needed)
+            out.first[several] = F + np.cumsum(counts) - counts
+            _setup_several(several, positions, triangles, view, out)
+    streams = _streams(positions, out, view)
+    work = Work(
+        "triangle_setup",
+        "triangleSetup",
+        TriangleSetupEvent,
+        table,
+        -(-F // BLOCK),
+        BLOCK,
+        SHARED_BYTES,
+        streams=streams,
+    )
+    return out, work, {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
+
+
+def _streams(positions: NDArray[np.float32], out: Setup, view: View) -> tuple[Stream, ...]:
+    """Buffers that setup reads and writes, as L2 sees them.
+
+    Lanes of a block read what they share (words of a line, vertices of neighbours) through L1 and the texture cache,
+    and writes to one line meet in L2, so that each buffer passes once. Records are written in sectors of 32 bytes.
+    """
+    indices, vertices = len(out.first) * INDEX_BYTES, len(positions) * POSITION_BYTES
+    kept = int(out.subtriangles.sum(dtype=np.int64))
+    headers, data = kept * HEADER_BYTES, kept * out.planes.shape[1] * 4
+    if view.guard_band and not (view.depth or view.interpolate):
+        data //= 2
+    return (
+        Stream("indices", "load", indices, indices),
+        Stream("positions", "load", vertices, vertices),
+        Stream("subtriangles", "store", len(out.first), len(out.first)),
+        Stream("headers", "store", headers, headers),
+        Stream("triangle_data", "store", data, data),
+    )
+
+
+def _empty_setup(F: int, slots: int, release: Release) -> Setup:
+    return Setup(
+        subtriangles=np.zeros(F, np.uint8),
+        first=np.empty(F, np.int32),
+        headers=np.zeros((slots, 6), np.int16),
+        misc=np.zeros(slots, np.uint32),
+        planes=np.zeros((slots, 16 if release == "1.1" else 4), np.uint32),
+        inputs=np.zeros(slots, np.int32),
+    )
+
+
+def _grown(setup: Setup, slots: int) -> Setup:
+    """Make room for more slots."""
+    longer = [np.concatenate([a, np.zeros((slots - len(a), *a.shape[1:]), a.dtype)]) for a in setup[2:]]
+    return Setup(setup.subtriangles, setup.first, *longer)

@@ -1,0 +1,1 @@
+"""Liu et al. 2010, FreePipe: one thread a triangle."""

@@ -1,0 +1,269 @@
+"""FreePipe, one warp: lanes in lockstep, as long as the largest triangle among them (Liu et al. 2010).
+
+A thread scans its triangle's box in two nested loops. Lanes come together again after each row, so a warp runs, for
+each row that any lane still has, as many steps as the widest box among those lanes. Lanes whose triangle needs no
+clipping go first; then the others scan the triangles of their clipped polygons, one after another.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.atomics import CHUNK_BYTES, SECTOR
+from models.coalescing import transactions
+from simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from simulator.stages.liu2010.freepipe_triangle import CLIPPED, INSIDE, SUBPIXEL_BITS, _fixed_depth, _start_edges
+
+WARP = 32
+INDEX_BYTES = 4
+POSITION_BYTES = 16
+_SLOTS = 64  # of a hash table: twice the lanes
+
+
+class Lanes(NamedTuple):
+    """One warp: scratch space of a worker."""
+
+    piece: NDArray[np.int64]  # (32,) the triangle that each lane scans, -1: none
+    row: NDArray[np.int64]  # (32, 9) edge functions at the row's first pixel, and their steps
+    pixel: NDArray[np.int64]  # (32, 3) edge functions at the pixel
+    row_depth: NDArray[np.float32]  # (32,)
+    depth: NDArray[np.float32]  # (32,)
+    address: NDArray[np.int64]  # (32,) of the lanes that hit, side by side
+    value: NDArray[np.uint64]  # (32,)
+    row_lane: NDArray[np.int64]  # (32,) the lanes that have the row in hand, side by side ...
+    row_pixel: NDArray[np.int64]  # (32,) ... the first pixel of each one's box in it ...
+    row_columns: NDArray[np.int64]  # (32,) ... and how many there are
+    seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
+    most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
+    slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
+
+
+@njit(cache=True, nogil=True)
+def _new_lanes():
+    return Lanes(
+        np.empty(WARP, np.int64),
+        np.empty((WARP, 9), np.int64),
+        np.empty((WARP, 3), np.int64),
+        np.empty(WARP, np.float32),
+        np.empty(WARP, np.float32),
+        np.empty(WARP, np.int64),
+        np.empty(WARP, np.uint64),
+        np.empty(WARP, np.int64),
+        np.empty(WARP, np.int64),
+        np.empty(WARP, np.int64),
+        np.full((2, _SLOTS), -1, np.int64),
+        np.empty((2, _SLOTS), np.int64),
+        np.empty((WARP, 2), np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _count_vertices(triangles, t0, lanes, simt, address, row):
+    """Count loads of three indices and three positions a lane."""
+    for k in range(3):
+        for lane in range(lanes):
+            address[lane] = (t0 + lane) * 3 * INDEX_BYTES + INDEX_BYTES * k
+        count, size = transactions(address, lanes, INDEX_BYTES, simt.coalescing)
+        for lane in range(lanes):
+            address[lane] = np.int64(triangles[t0 + lane, k]) * POSITION_BYTES
+        more, more_size = transactions(address, lanes, POSITION_BYTES, simt.coalescing)
+        row[FreePipeEvent.LOAD_TRANSACTIONS] += count + more
+        row[FreePipeEvent.LOAD_BYTES] += size + more_size
+
+
+@njit(cache=True, nogil=True)
+def _start_rows(pieces, lanes):
+    """Set each lane up at its box's first pixel; returns lanes that have a piece and the most rows of any."""
+    active, most = 0, 0
+    for lane in range(WARP):
+        p = lanes.piece[lane]
+        if p >= 0:
+            active += 1
+            box = pieces.box[p]
+            _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
+            lanes.row_depth[lane] = pieces.depth[p, 0]
+            most = max(most, int(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
+    return active, most
+
+
+@njit(cache=True, nogil=True)
+def _start_row(pieces, lanes, r, width):
+    """Let the lanes that have row r begin it; returns how many those are, and the widest box among them."""
+    active, widest = 0, 0
+    for lane in range(WARP):
+        p = lanes.piece[lane]
+        if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
+            lanes.row_lane[active] = lane
+            lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
+            lanes.row_columns[active] = pieces.box[p, 1] - pieces.box[p, 0] + 1
+            widest = max(widest, lanes.row_columns[active])
+            active += 1
+            for k in range(3):
+                lanes.pixel[lane, k] = lanes.row[lane, k]
+                lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
+            lanes.depth[lane] = lanes.row_depth[lane]
+            lanes.row_depth[lane] += pieces.depth[p, 2] * np.float32(16)
+    return active, widest
+
+
+@njit(cache=True, nogil=True)
+def _step(pieces, lanes, active, c, word_bytes, ids):
+    """Test the c-th pixel of the row of every lane that has one; returns those lanes, and those that hit.
+
+    Lanes that have no such pixel leave the row, and the others close up.
+    """
+    tests, hits = 0, 0
+    for i in range(active):
+        lane, first, columns = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i]
+        if c >= columns:
+            continue
+        if tests < i:
+            lanes.row_lane[tests], lanes.row_pixel[tests], lanes.row_columns[tests] = lane, first, columns
+        tests += 1
+        f = lanes.pixel[lane]
+        if f[0] | f[1] | f[2] >= 0:
+            lanes.address[hits] = (first + c) * word_bytes
+            if ids:
+                lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
+            hits += 1
+        for k in range(3):
+            f[k] -= lanes.row[lane, 4 + 2 * k]
+        lanes.depth[lane] += pieces.depth[lanes.piece[lane], 1] * np.float32(16)
+    return tests, hits
+
+
+@njit(cache=True, nogil=True)
+def _early(lanes, hits, t0, frame, word_bytes, simt, row):
+    """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
+    count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
+    row[FreePipeEvent.READS] += 1
+    row[FreePipeEvent.LOAD_TRANSACTIONS] += count
+    row[FreePipeEvent.LOAD_BYTES] += size
+    kept = 0
+    for i in range(hits):
+        value = lanes.value[i] + np.uint64(t0)
+        if frame[lanes.address[i] // word_bytes] > value:
+            lanes.address[kept], lanes.value[kept] = lanes.address[i], value
+            kept += 1
+    for i in range(kept):
+        pixel = lanes.address[i] // word_bytes
+        frame[pixel] = min(frame[pixel], lanes.value[i])
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _slot(seen, most, key):
+    """Place of a key in a hash table; a new one begins with 0."""
+    i = key & (_SLOTS - 1)
+    while seen[i] != key:
+        if seen[i] < 0:
+            seen[i], most[i] = key, 0
+        else:
+            i = (i + 1) & (_SLOTS - 1)
+    return i
+
+
+@njit(cache=True, nogil=True)
+def _count_atomics(lanes, hits, shape, merge, row, chunks):
+    """One instruction on each plane of the frame buffer, by the rules of ``models.atomics``.
+
+    A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
+    """
+    conflicts, depth, requests = 0, 0, 0
+    for i in range(hits):
+        pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] // shape.word_bytes)
+        chunk = _slot(lanes.seen[1], lanes.most[1], lanes.address[i] // CHUNK_BYTES)
+        rank, served = lanes.most[0, pixel] + 1, lanes.most[1, chunk]
+        lanes.most[0, pixel], lanes.most[1, chunk] = rank, max(rank, served)
+        lanes.slot[i, 0], lanes.slot[i, 1] = pixel, chunk
+        conflicts += rank > 1
+        depth = max(depth, rank)
+        if merge != SECTOR or rank > served:
+            requests += 1
+            for plane in range(shape.words):
+                chunks[(lanes.address[i] + plane * shape.plane_bytes) // CHUNK_BYTES] += 1
+    for i in range(hits):
+        lanes.seen[0, lanes.slot[i, 0]] = lanes.seen[1, lanes.slot[i, 1]] = -1
+    row[FreePipeEvent.ATOMIC] += shape.words
+    row[FreePipeEvent.ATOMIC_LANES] += shape.words * hits
+    row[FreePipeEvent.ATOMIC_REQUESTS] += shape.words * requests
+    row[FreePipeEvent.ATOMIC_CONFLICTS] += shape.words * conflicts
+    row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
+
+
+@njit(cache=True, nogil=True)
+def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
+    """Scan the lanes' pieces in lockstep; returns the steps taken."""
+    active, rows = _start_rows(pieces, lanes)
+    steps = 0
+    row[FreePipeEvent.SETUP_STEPS] += 1
+    row[FreePipeEvent.SETUP_LANES] += active
+    for r in range(rows):
+        active, widest = _start_row(pieces, lanes, r, shape.width)
+        row[FreePipeEvent.ROW_STEPS] += 1
+        row[FreePipeEvent.ROW_LANES] += active
+        row[FreePipeEvent.WARP_STEPS] += widest
+        steps += widest
+        for c in range(widest):
+            active, hits = _step(pieces, lanes, active, c, shape.word_bytes, frame is not None)
+            row[FreePipeEvent.SAMPLE_TESTS] += active
+            row[FreePipeEvent.SAMPLE_HITS] += hits
+            if frame is not None and hits > 0:
+                hits = _early(lanes, hits, t0, frame, shape.word_bytes, simt, row)
+            if hits > 0:
+                _count_atomics(lanes, hits, shape, simt.atomic_merge, row, chunks)
+    return steps
+
+
+class FrameShape(NamedTuple):
+    """The frame buffer as threads address it."""
+
+    width: int
+    word_bytes: int
+    words: int  # atomics a fragment
+    plane_bytes: int  # bytes from a fragment's one word to the next
+
+
+@njit(cache=True, nogil=True)
+def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, frame):
+    """One warp, triangles t0..t0+lanes_in-1; returns the steps of its longest way."""
+    row[FreePipeEvent.WARPS] += 1
+    row[FreePipeEvent.LANES_IN] += lanes_in
+    _count_vertices(triangles, t0, lanes_in, simt, lanes.address, row)
+    inside, clip, turns = 0, 0, 0
+    lanes.piece[:] = -1
+    for lane in range(lanes_in):
+        t = t0 + lane
+        if pieces.kind[t] == INSIDE:
+            inside += 1
+            lanes.piece[lane] = pieces.first[t]
+        elif pieces.kind[t] == CLIPPED:
+            clip += 1
+            turns = max(turns, pieces.first[t + 1] - pieces.first[t])
+    row[FreePipeEvent.CLIP_WARPS] += clip > 0
+    row[FreePipeEvent.CLIP_LANES] += clip
+    steps = 0
+    if inside > 0:
+        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+    for i in range(turns):
+        for lane in range(WARP):
+            t = t0 + lane
+            mine = lane < lanes_in and pieces.kind[t] == CLIPPED and pieces.first[t] + i < pieces.first[t + 1]
+            lanes.piece[lane] = pieces.first[t] + i if mine else -1
+        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+    return steps
+
+
+@njit(cache=True, nogil=True)
+def _blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
+    """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
+    lanes = _new_lanes()
+    for b in range(part, table.shape[0], parts):
+        longest = 0
+        for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
+            lanes_in = min(WARP, min((b + 1) * block, triangles.shape[0]) - t0)
+            steps = _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks[part], frame)
+            longest = max(longest, steps)
+        table[b, FreePipeEvent.CHAIN_STEPS] = longest

@@ -1,0 +1,1 @@
+"""Yao et al.: bit mask filtering."""
