@@ -23,7 +23,7 @@ def heat_map(counts: NDArray[Any], path: Path, *, title: str, unit: str, width: 
     width, height : int
         Of the screen in pixels: the axes.
     """
-    with figure(path, title, figsize=(8, 8 * height / width + 0.8)) as axes:
+    with figure(path, title, figsize=(8, 6.4 * height / width + 1.0)) as axes:
         shown = np.ma.masked_invalid(np.asarray(counts, np.float64))
         top = float(np.quantile(shown.compressed(), 0.999)) if shown.count() else 1.0
         image = axes.imshow(
@@ -31,4 +31,4 @@ def heat_map(counts: NDArray[Any], path: Path, *, title: str, unit: str, width: 
         )
         axes.grid(visible=False)
         axes.set(xlabel="x [pixels]", ylabel="y [pixels]")
-        axes.figure.colorbar(image, ax=axes, label=unit, shrink=0.8, extend="max")
+        axes.figure.colorbar(image, ax=axes, label=unit, shrink=0.9, extend="max")

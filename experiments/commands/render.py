@@ -195,8 +195,9 @@ def write_map(run: Run, name: str, path: Path) -> None:
     if name not in run.frame.maps:
         raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
     title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
-    unit = f"{name} a tile or pixel"
-    heat_map(run.frame.maps[name], path, title=title, unit=unit, width=run.width, height=run.height)
+    counts = run.frame.maps[name]
+    unit = f"{name} a {'pixel' if counts.shape == (run.height, run.width) else 'tile'}"
+    heat_map(counts, path, title=title, unit=unit, width=run.width, height=run.height)
 
 
 def as_json(run: Run) -> dict[str, Any]:

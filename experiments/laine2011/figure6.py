@@ -19,6 +19,8 @@ from simulator.simulation import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 BATCHES = (1, 2, 4, 8, 14)
 FAIRY_STAND_IN = "littlest_tokyo"  # 141,802 triangles of many sizes; FairyForest has 174,117
 AIM = 0.5

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 OTHER = "gtx680"
 
 

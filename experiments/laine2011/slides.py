@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from experiments.laine2011.generated import Statistics
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 
 def run(progress: Progress) -> Result:
     """Draw generated scenes by three pipelines."""

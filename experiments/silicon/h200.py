@@ -17,6 +17,8 @@ from reports.plots import paired_bars
 if TYPE_CHECKING:
     import pandas as pd
 
+SLOW = True  # with what it needs compiled, more than the first run should take
+
 SHARED = "TILESTAMP_SHARED"  # names the folder that has silicon/ in it
 SOURCE = "Measurements on one NVIDIA H200, CUDA 13.0: medians of 60 by CUPTI, counters by ncu"
 CONSTANTS = "teapot_512x512_bb4"  # scene whose tile raster times gave S2UR, BRANCH and pipe.control
