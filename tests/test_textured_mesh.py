@@ -161,7 +161,7 @@ def test_nan_coordinates_show_the_base_colour():
 
 
 def test_a_scene_without_triangles_is_refused():
-    with pytest.raises(TilestampError, match="no triangles"):
+    with pytest.raises(TilestampError, match="neither patches nor triangles"):
         geometry(Scene("empty"))
 
 
