@@ -37,9 +37,14 @@ def frame_image(
         shaded = np.einsum("hwk,hwkc->hwc", weights, corners) * (ids >= 0)[..., None]
         picture: NDArray[np.uint8] = np.clip(shaded * 255 + 0.5, 0, 255).astype(np.uint8)
         return picture[::-1]
-    packed = buffers.color[:, :height, :width]
-    channels = [((packed >> np.uint32(8 * c)) & np.uint32(255)).mean(axis=0) for c in range(3)]
-    return (np.stack(channels, axis=-1) + 0.5).astype(np.uint8)[::-1]
+    samples = len(buffers.color)
+    packed = np.ascontiguousarray(buffers.color[:, :height, :width][:, ::-1])
+    bytes_ = packed.view(np.uint8).reshape(samples, height, width, 4)[..., :3]
+    if samples == 1:
+        return np.ascontiguousarray(bytes_[0])
+    total = bytes_.sum(axis=0, dtype=np.uint16)
+    mean: NDArray[np.uint8] = ((2 * total + samples) // (2 * samples)).astype(np.uint8)  # rounded to nearest
+    return mean
 
 
 def tile_maps(maps: dict[str, NDArray[np.int64]], tiles: TileQueues, fine: Work | None) -> None:
