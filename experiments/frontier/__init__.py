@@ -1,0 +1,1 @@
+"""Frontiers: what accuracy costs, of the methods and of the model itself."""
