@@ -15,7 +15,6 @@ all models and never for a cell:
   ``control_points`` gives, on every model alike (figures in ``simulator/scenes/views.py``).
 """
 
-from enum import IntEnum
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -25,17 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
-from simulator.stages.eisenacher2010.bezier import (
-    LANES,
-    POINTS,
-    gather,
-    new_squares,
-    restrict,
-    restriction,
-    screen_points,
-    set_square,
-)
+from simulator.stages.eisenacher2010.bezier import LANES, screen_points
 from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
 from simulator.stages.eisenacher2010.split_counts import oracle_work, scan_works, subdivide_work, transform_work
 from simulator.work import Work
 
@@ -46,6 +37,7 @@ MAX_QUEUE = 2**24  # sub-patches
 
 BoundRule = Literal["control_points", "pixel_extent"]
 BOUND_RULES = ("control_points", "pixel_extent")
+_SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by path
 
 
 class SubPatches(NamedTuple):
@@ -59,129 +51,6 @@ class SubPatches(NamedTuple):
     i: NDArray[np.uint16]  # (N,) along u
     j: NDArray[np.uint16]  # (N,) along v
     passes: NDArray[np.int64]  # (passes, 5)
-
-
-class Path(IntEnum):
-    """What the oracle found, and the way it took."""
-
-    CULL = 0  # off screen, or wholly behind the eye
-    KEEP = 1
-    GIVE_UP = 2  # still large, or still across the eye plane, at the depth limit
-    ACROSS = 3  # split without a box: across the eye plane
-    SPLIT = 4
-
-
-CULL, KEEP, GIVE_UP, ACROSS, SPLIT = (int(path) for path in Path)
-_SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by path
-
-
-class _Scratch(NamedTuple):
-    """Sub-patches side by side, and what the oracle finds out about them."""
-
-    by_u: NDArray[np.float32]  # (4, 4, LANES)
-    by_v: NDArray[np.float32]
-    between: NDArray[np.float32]  # (4, 4, LANES)
-    patch_net: NDArray[np.float32]  # (3, 16, LANES) x w, y w in pixels, and w
-    net: NDArray[np.float32]  # (3, 16, LANES)
-    everywhere: NDArray[np.int32]  # (LANES,) sides of the frustum that all points lie outside of
-    anywhere: NDArray[np.int32]  # (LANES,) that a point lies outside of
-    box: NDArray[np.float32]  # (4, LANES) x0, y0, x1, y1
-
-
-_BEHIND, _NOT_FRONT = np.int32(16), np.int32(32)  # bits: w <= 0; w > 0 does not hold (it may be no number)
-_OFF_SCREEN = np.int32(31)
-_ROW = POINTS * LANES  # a coordinate of all points
-
-
-@njit(cache=True, nogil=True)
-def _new_scratch(side: Any, lanes: Any) -> Any:
-    return _Scratch(
-        np.empty(4 * side * lanes, np.float32),
-        np.empty(4 * side * lanes, np.float32),
-        np.empty(side * side * lanes, np.float32),
-        np.empty(3 * POINTS * lanes, np.float32),
-        np.empty(3 * POINTS * lanes, np.float32),
-        np.empty(lanes, np.int32),
-        np.empty(lanes, np.int32),
-        np.empty((4, lanes), np.float32),
-    )
-
-
-@njit(cache=True, nogil=True)
-def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any) -> Any:
-    """Whether a box satisfies the bound."""
-    if whole_pixels:
-        return np.floor(x1) - np.floor(x0) <= bound and np.floor(y1) - np.floor(y0) <= bound
-    return x1 - x0 < bound and y1 - y0 < bound
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _measure(s: Any, width: Any, height: Any) -> Any:
-    """Sides of the frustum and boxes of all lanes; a box means nothing where a point lies behind the eye."""
-    net, box = s.net, s.box
-    s.everywhere[:] = -1
-    s.anywhere[:] = 0
-    box[:2] = np.inf
-    box[2:] = -np.inf
-    lanes = s.everywhere.shape[0]
-    for k in range(0, POINTS * LANES, LANES):
-        for n in range(lanes):
-            x, y, w = net[k + n], net[_ROW + k + n], net[2 * _ROW + k + n]
-            out = np.int32(x < 0) | np.int32(x > width * w) << 1 | np.int32(y < 0) << 2 | np.int32(y > height * w) << 3
-            out |= np.int32(w <= 0) << 4 | np.int32(not w > 0) << 5
-            s.everywhere[n] &= out
-            s.anywhere[n] |= out
-        for n in range(lanes):
-            scale = np.float32(1) / net[2 * _ROW + k + n]
-            x, y = net[k + n] * scale, net[_ROW + k + n] * scale
-            box[0, n], box[1, n] = min(box[0, n], x), min(box[1, n], y)
-            box[2, n], box[3, n] = max(box[2, n], x), max(box[3, n], y)
-
-
-@njit(cache=True, nogil=True)
-def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
-    """What was found about lane ``n``."""
-    if s.everywhere[n] & _OFF_SCREEN:
-        return CULL
-    if s.anywhere[n] & _NOT_FRONT:
-        return ACROSS
-    return KEEP if _is_small(s.box[0, n], s.box[1, n], s.box[2, n], s.box[3, n], bound, whole_pixels) else SPLIT
-
-
-@njit(cache=True, nogil=True)
-def _oracle(
-    part: Any,
-    parts: Any,
-    side: Any,
-    width: Any,
-    screen: Any,
-    queue: Any,
-    path: Any,
-    size: Any,
-    bound: Any,
-    whole_pixels: Any,
-    max_depth: Any,
-) -> Any:
-    """Examine one part of the queue, ``width`` (LANES) at once; a sub-patch that was kept before is kept again."""
-    s, squares = _new_scratch(side, width), new_squares(width)
-    picked = np.empty(LANES, np.int64)
-    k, stop = part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts
-    while k < stop:
-        lanes = 0
-        while k < stop and lanes < LANES:
-            if path[k] != KEEP:
-                set_square(squares, lanes, queue, k)
-                picked[lanes] = k
-                lanes += 1
-            k += 1
-        restriction(squares.i, squares.side, s.by_u)
-        restriction(squares.j, squares.side, s.by_v)
-        gather(screen, squares.patch, s.patch_net)
-        restrict(s.patch_net, s.by_u, s.by_v, s.between, s.net)
-        _measure(s, size[0], size[1])
-        for n in range(lanes):
-            found = _path(s, n, bound, whole_pixels)
-            path[picked[n]] = GIVE_UP if found >= ACROSS and queue.level[picked[n]] >= max_depth else found
 
 
 @njit(cache=True, nogil=True)
@@ -213,6 +82,8 @@ def bound_and_split(
     *,
     bound_rule: BoundRule = "control_points",
     counting: bool = True,
+    near: float = 0.0,
+    min_depth: int = 0,
     max_depth: int = MAX_DEPTH,
 ) -> tuple[SubPatches, list[Work]]:
     """Subdivide patches until their sub-patches are small on screen.
@@ -232,6 +103,10 @@ def bound_and_split(
         How a box is measured; see the module.
     counting : bool
         Without it no works come back.
+    near : float
+        Sub-patches that lie wholly nearer to the eye's plane are culled (not in the paper).
+    min_depth : int
+        Halvings that every sub-patch on screen takes; as many as the deepest needs make all alike, and no cracks.
     max_depth : int
         Halvings after which a sub-patch that is still large, or across the eye plane, is given up: it is dropped and
         counted in ``SubPatches.passes``.
@@ -247,16 +122,18 @@ def bound_and_split(
     TilestampError
         Options out of range, numbers that are not finite, or more than 16 M sub-patches.
     """
-    _check(points, bound, bound_rule, max_depth)
+    _check(points, bound, bound_rule, near, min_depth, max_depth)
     screen = screen_points(points, matrix, width, height)
-    size, limit = np.array([width, height], np.float32), np.float32(bound)
+    size, limit = np.array([width, height, near], np.float32), np.float32(bound)
     queue, path = _first_queue(len(points))
     works = [transform_work(len(points), simt)] if counting else []
     passes = []
     while True:
         whole_pixels = bound_rule == "pixel_extent"
         parts = parts_of(len(path), BLOCK)
-        for_parts(_oracle, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels, max_depth)
+        for_parts(
+            examine, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels, min_depth, max_depth
+        )
         slots = _SLOTS[path]
         places, scan = bucket_scan(slots, simt, counting=counting)
         culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
@@ -307,7 +184,9 @@ def _next_queue(
     return target, target_path
 
 
-def _check(points: NDArray[np.float32], bound: float, bound_rule: str, max_depth: int) -> None:
+def _check(
+    points: NDArray[np.float32], bound: float, bound_rule: str, near: float, min_depth: int, max_depth: int
+) -> None:
     """Refuse what the oracle would never be done with."""
     if points.ndim != 3 or points.shape[1:] != (16, 4):
         raise TilestampError(f"patches need 16 points of 4 numbers each, not an array of shape {points.shape}")
@@ -317,5 +196,9 @@ def _check(points: NDArray[np.float32], bound: float, bound_rule: str, max_depth
         raise TilestampError(f"bound must be a positive number of pixels, not {bound}")
     if bound_rule not in BOUND_RULES:
         raise TilestampError(f"bound_rule must be one of {', '.join(BOUND_RULES)}, not {bound_rule}")
+    if not (np.isfinite(near) and near >= 0):
+        raise TilestampError(f"near must be a distance of 0 or more, not {near}")
+    if not 0 <= min_depth <= max_depth:
+        raise TilestampError(f"min_depth must lie between 0 and max_depth ({max_depth}), not {min_depth}")
     if not 0 <= max_depth <= MAX_DEPTH:
         raise TilestampError(f"max_depth must lie between 0 and {MAX_DEPTH}, not {max_depth}")
