@@ -1,0 +1,235 @@
+"""Which triangle each sample sees, exactly: rational arithmetic for coverage, double precision for depth.
+
+Nothing is snapped, clipped or divided: edge functions are determinants of homogeneous corners (Olano & Greer 1997), so
+that a triangle may cross the eye's plane. A double with an error bound decides nearly all samples, exact arithmetic the
+others (`orientation`). A sample on an edge belongs to the triangle whose left or top edge that is. Depth is linear on
+the screen; what lies outside -1 to 1 is cut off sample by sample. Of equal depths the first triangle stays.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.errors import TilestampError
+from simulator.parallel import for_parts, parts_of
+from simulator.reference.orientation import COMPONENTS, edge_function, edge_sign, sure_sign
+
+CENTRE = (0.5, 0.5)
+_PART_ROWS = 16  # at least
+
+
+class Grid(NamedTuple):
+    """A regular grid of samples: column i, row j lies at (x + i dx, y + j dy); row 0 is on top."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+    columns: int
+    rows: int
+
+
+class Visible(NamedTuple):
+    """What the samples see; row 0 is the top row."""
+
+    ids: NDArray[np.int32]  # (rows, columns) nearest triangle, -1 where there is none
+    depth: NDArray[np.float64]  # (rows, columns) of the nearest, infinite where there is none
+    hits: NDArray[np.int32]  # (rows, columns) triangles that cover the sample
+
+
+@njit(cache=True, nogil=True)
+def set_up(corners, edges, owns, expansion):
+    """Edge functions opposite to corners 0, 1, 2, positive inside; returns the orientation, 0 where it has no area.
+
+    Parameters
+    ----------
+    corners : ndarray, (3, 3), float64
+    edges : ndarray, (3, 6), float64
+        Coefficients of x, y, 1 and of the error bound.
+    owns : ndarray, (3,), bool
+        Whether samples on the edge are the triangle's.
+    """
+    for k in range(3):
+        edge_function(corners[(k + 1) % 3], corners[(k + 2) % 3], edges[k])
+    a = corners[0]
+    sign = sure_sign(edges[0], corners[1], corners[2], a[0], a[1], a[2], expansion)
+    for k in range(3):
+        p, q = corners[(k + 1) % 3], corners[(k + 2) % 3]
+        right = sign * sure_sign(edges[k], p, q, 1.0, 0.0, 0.0, expansion)
+        down = sign * sure_sign(edges[k], p, q, 0.0, 1.0, 0.0, expansion)
+        owns[k] = right > 0 or (right == 0 and down > 0)
+        for c in range(3):
+            edges[k, c] *= sign
+    return sign
+
+
+@njit(cache=True, nogil=True)
+def _covers(corners, edges, owns, sign, x, y, values, expansion):
+    """Whether the triangle covers a sample; ``values`` takes its edge functions there."""
+    for k in range(3):
+        edge = edges[k]
+        value = edge[0] * x + edge[1] * y + edge[2]
+        values[k] = value
+        bound = edge[3] * abs(x) + edge[4] * abs(y) + edge[5]
+        if value < -bound:
+            return False
+        if value <= bound:
+            exact = sign * edge_sign(corners[(k + 1) % 3], corners[(k + 2) % 3], x, y, 1.0, expansion)
+            if exact < 0 or (exact == 0 and not owns[k]):
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _span(corners, axis, first, step, count):
+    """First and last grid line that a triangle can touch, or one more; all where it crosses the eye's plane."""
+    low, high = np.inf, -np.inf
+    for k in range(3):
+        if corners[k, 2] <= 0.0:
+            return 0, count - 1
+        at = (corners[k, axis] / corners[k, 2] - first) / step
+        low, high = min(low, at), max(high, at)
+    if not (low <= high) or high < -1.0 or low > count:
+        return 0, -1
+    return max(int(np.floor(max(low, 0.0))) - 1, 0), min(int(np.ceil(min(high, float(count)))) + 1, count - 1)
+
+
+@njit(cache=True, nogil=True)
+def draw(corners, depths, cull, grid, first_row, end_row, visible):
+    """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; ``visible`` holds only those."""
+    ids, depth, hits = visible
+    edges, owns, values = np.empty((3, 6)), np.empty(3, np.bool_), np.empty(3)
+    expansion = np.empty(COMPONENTS)
+    for t in range(corners.shape[0]):
+        triangle = corners[t]
+        top, bottom = _span(triangle, 1, grid.y, grid.dy, grid.rows)
+        if bottom < first_row or top >= end_row:
+            continue
+        left, right = _span(triangle, 0, grid.x, grid.dx, grid.columns)
+        if right < left:
+            continue
+        sign = set_up(triangle, edges, owns, expansion)
+        if sign == 0 or (cull and sign > 0):  # with y down, counter-clockwise is negative
+            continue
+        for j in range(max(top, first_row), min(bottom + 1, end_row)):
+            y, row = grid.y + j * grid.dy, j - first_row
+            for i in range(left, right + 1):
+                x = grid.x + i * grid.dx
+                if not _covers(triangle, edges, owns, sign, x, y, values, expansion):
+                    continue
+                z = depth_of(triangle, depths[t], values, sign)
+                if not -1.0 <= z <= 1.0:
+                    continue
+                hits[row, i] += 1
+                if z < depth[row, i]:
+                    depth[row, i], ids[row, i] = z, t
+
+
+@njit(cache=True, nogil=True)
+def depth_of(triangle, depths, values, sign):
+    """Depth at a sample from its edge functions: there w is 1, so weights that sum to det give z over w."""
+    a, b, c = triangle[0], triangle[1], triangle[2]
+    det = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    return (values[0] * depths[0] + values[1] * depths[1] + values[2] * depths[2]) / (sign * det)
+
+
+@njit(cache=True, nogil=True)
+def _draw_part(part, parts, corners, depths, cull, grid, ids, depth, hits):
+    first, end = grid.rows * part // parts, grid.rows * (part + 1) // parts
+    draw(corners, depths, cull, grid, first, end, (ids[first:end], depth[first:end], hits[first:end]))
+
+
+def exact_coverage(
+    corners: NDArray[np.floating],
+    width: int,
+    height: int,
+    *,
+    depths: NDArray[np.floating] | None = None,
+    offset: tuple[float, float] = CENTRE,
+) -> Visible:
+    """Cover the pixels of a screen with triangles in screen coordinates, exactly.
+
+    Parameters
+    ----------
+    corners : ndarray, (T, 3, 2), float64
+        x and y in pixels from the top left corner, y down; either way round.
+    width, height : int
+        Pixels.
+    depths : ndarray, (T, 3), optional
+        Of the corners, -1 nearest to 1 farthest; 0 if not given (then the first triangle stays).
+    offset : (float, float)
+        Where in its pixel the sample lies.
+
+    Returns
+    -------
+    Visible
+        ``hits`` counts the triangles on each sample: 1 everywhere in a partition.
+
+    Raises
+    ------
+    TilestampError
+        Corners of another shape, or not finite.
+    """
+    if corners.ndim != 3 or corners.shape[1:] != (3, 2) or not np.isfinite(corners).all():
+        raise TilestampError(f"exact coverage: corners must be finite and (T, 3, 2), not {corners.shape}")
+    homogeneous = np.ones((len(corners), 3, 3))
+    homogeneous[:, :, :2] = corners
+    deep = np.zeros((len(corners), 3)) if depths is None else np.ascontiguousarray(depths, np.float64)
+    return _cover(homogeneous, deep, Grid(offset[0], offset[1], 1.0, 1.0, width, height), cull=False)
+
+
+def exact_visibility(
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    width: int,
+    height: int,
+    *,
+    offset: tuple[float, float] = CENTRE,
+    cull_backfaces: bool = False,
+) -> Visible:
+    """Find the triangle that each pixel's sample sees, from float32 clip space as the pipelines get it.
+
+    Parameters
+    ----------
+    positions : ndarray, (V, 4), float32
+        Clip space.
+    triangles : ndarray, (F, 3), int32
+    width, height : int
+        Pixels.
+    offset : (float, float)
+        Where in its pixel the sample lies, from the top left corner.
+    cull_backfaces : bool
+        Leave out what is clockwise on the screen.
+
+    Returns
+    -------
+    Visible
+        Depth is z / w.
+    """
+    corners, depths = homogeneous_corners(positions, triangles, width, height)
+    return _cover(corners, depths, pixel_grid(width, height, offset), cull=cull_backfaces)
+
+
+def homogeneous_corners(
+    positions: NDArray[np.float32], triangles: NDArray[np.int32], width: int, height: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (F, 3, 3) in half pixels from the screen's centre, y down, and their z (F, 3): both without rounding."""
+    clip = positions.astype(np.float64)[triangles]
+    return np.stack([clip[..., 0] * width, -clip[..., 1] * height, clip[..., 3]], axis=-1), np.ascontiguousarray(
+        clip[..., 2]
+    )
+
+
+def pixel_grid(width: int, height: int, offset: tuple[float, float] = CENTRE, side: int = 1) -> Grid:
+    """One sample a pixel, or ``side`` x ``side``, as `homogeneous_corners` measures them: in half pixels."""
+    step = 2.0 / side
+    return Grid(offset[0] * step - width, offset[1] * step - height, step, step, width * side, height * side)
+
+
+def _cover(corners: NDArray[np.float64], depths: NDArray[np.float64], grid: Grid, *, cull: bool) -> Visible:
+    shape = (grid.rows, grid.columns)
+    visible = Visible(np.full(shape, -1, np.int32), np.full(shape, np.inf), np.zeros(shape, np.int32))
+    for_parts(_draw_part, parts_of(grid.rows, _PART_ROWS), corners, depths, cull, grid, *visible)
+    return visible
