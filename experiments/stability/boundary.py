@@ -156,11 +156,10 @@ def _cells(boundary: Boundary) -> list[Cell]:
 
 def _sentence(boundary: Boundary) -> str:
     """What goes wrong and what the cure costs, for the page."""
+    at = boundary.holds if boundary.breaks is None else boundary.breaks
+    where = f"{boundary.parameter} {at:.4g} {boundary.unit}".rstrip()
     if boundary.breaks is None:
-        return f"{boundary.method}: never breaks up to {boundary.parameter} {boundary.holds:g} {boundary.unit}."
+        return f"{boundary.method}: never breaks up to {where}."
     cure = f" Cure: {boundary.cure}" if boundary.cure else ""
     cost = f" ({boundary.cost})" if boundary.cost else ""
-    return (
-        f"{boundary.method}: from {boundary.parameter} {boundary.breaks:g} {boundary.unit}, {boundary.wrong}."
-        f"{cure}{cost}{'.' if cure else ''}"
-    )
+    return f"{boundary.method}: from {where}, {boundary.wrong}.{cure}{cost}{'.' if cure else ''}"

@@ -1,0 +1,198 @@
+"""What the rows of the atlas share: small pictures by each method's own coverage arithmetic, and the exact answer.
+
+Corners are given in pixels, x right and y up, in multiples of 1/65536 pixel on a screen of at most 256 pixels: such a
+number is exact in float32 as a pixel coordinate and as a clip coordinate, so whatever differs from the exact coverage
+is the method's own rounding, not its input's.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from models.machine import load_machine
+from simulator import Run, simulate
+from simulator.reference.coverage import exact_coverage
+from simulator.scenes.scene import Scene
+from simulator.stages.eisenacher2010.tile_range import screen_tiles
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
+from simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, new_setup, set_up
+from simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
+from simulator.stages.zhang2025.fine_rasterizer import coverage
+
+MACHINE = "h200"
+STEPS = 65536  # a pixel
+TILE = 8
+_HALF, _ONE = np.float32(0.5), np.float32(1.0)
+
+
+class Cover(NamedTuple):
+    """What a method covers.
+
+    Parameters
+    ----------
+    mask : ndarray, (H, W), bool
+        Row 0 is the bottom row.
+    hits : int
+        Covered samples, each triangle's counted.
+    """
+
+    mask: NDArray[np.bool_]
+    hits: int
+
+    @property
+    def doubles(self) -> int:
+        """Hits beyond the first at a sample."""
+        return self.hits - int(self.mask.sum())
+
+
+Method = Callable[[NDArray[np.float64], int], Cover]
+
+
+def quantized(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round pixel coordinates to what every method gets exactly."""
+    rounded: NDArray[np.float64] = np.round(np.asarray(points) * STEPS) / STEPS
+    return rounded
+
+
+def flat_scene(points: NDArray[np.float64], size: int) -> Scene:
+    """Make a clip-space scene of triangles (T, 3, 2) in pixels, all at depth 0."""
+    flat = np.asarray(points, np.float64).reshape(-1, 2)
+    positions = np.zeros((len(flat), 4))
+    positions[:, :2] = flat * 2 / size - 1
+    positions[:, 3] = 1
+    return Scene.from_clip_space(positions, np.arange(len(flat)).reshape(-1, 3))
+
+
+def exact(points: NDArray[np.float64], size: int) -> Cover:
+    """Cover without any rounding."""
+    hits = exact_coverage(_downward(points, size), size, size).hits[::-1]
+    return Cover(hits > 0, int(hits.sum()))
+
+
+def _downward(points: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Count y from the top, exactly."""
+    return points * [1, -1] + [0, size]
+
+
+def by_pipeline(pipeline: str, **options: Any) -> Method:
+    """Cover by a whole pipeline."""
+
+    def cover(points: NDArray[np.float64], size: int) -> Cover:
+        run = draw(flat_scene(points, size), pipeline, size, **options)
+        ids = run.triangle_ids
+        assert ids is not None  # noqa: S101 - all pipelines of triangles give them
+        return Cover(ids[::-1] >= 0, sum(n for name, n in run.counts.items() if name.endswith(".SAMPLE_HITS")))
+
+    return cover
+
+
+def draw(scene: Scene, pipeline: str, size: int, camera: Any = None, **options: Any) -> Run:
+    """Draw a square picture on the atlas's machine."""
+    return simulate(scene, pipeline, load_machine(MACHINE), width=size, height=size, camera=camera, **options)
+
+
+def barycentrics(points: NDArray[np.float64], size: int) -> Cover:
+    """Cover as ``tiled`` and ``per-primitive`` do: three float32 barycentrics between 0 and 1."""
+    screen = _screen(points, size)
+    count = np.zeros((size, size), np.int64)
+    _barycentric_cover(screen, np.arange(len(screen), dtype=np.int32).reshape(-1, 3), count)
+    return Cover(count[::-1] > 0, int(count.sum()))
+
+
+def edge_planes(points: NDArray[np.float64], size: int) -> Cover:
+    """Cover as ``binned`` does: float32 planes a*x + b*y + c over the screen, stepped through 8x8-pixel tiles."""
+    p = points.astype(np.float32)
+    a, b, c = p[:, 0], p[:, 1], p[:, 2]
+    signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    p[signed < 0] = p[signed < 0][:, [0, 2, 1]]
+    edges = plane_edges(p)
+    count = np.zeros((size, size), np.int64)
+    for t in np.flatnonzero(signed != 0):
+        low = np.clip(p[t].min(axis=0) // TILE, 0, size // TILE - 1).astype(int)
+        high = np.clip(p[t].max(axis=0) // TILE, 0, size // TILE - 1).astype(int)
+        for row in range(low[1], high[1] + 1):
+            for column in range(low[0], high[0] + 1):
+                mask = int(coverage(edges[t], column * TILE, row * TILE, TILE, TILE))
+                bits = np.frombuffer(mask.to_bytes(8, "little"), np.uint8)
+                inside_tile = np.unpackbits(bits, bitorder="little").reshape(TILE, TILE)
+                count[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE] += inside_tile
+    return Cover(count > 0, int(count.sum()))
+
+
+def plane_edges(p: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Edge equations (T, 3, 3) of corners (T, 3, 2), as the binned pipeline's triangle setup rounds them."""
+    q, r = p[:, [1, 2, 0]], p[:, [2, 0, 1]]
+    constant = q[..., 0] * r[..., 1] - r[..., 0] * q[..., 1]
+    return np.stack([q[..., 1] - r[..., 1], r[..., 0] - q[..., 0], constant], axis=-1)
+
+
+def stamp(points: NDArray[np.float64], size: int) -> Cover:
+    """Cover as ``stamps``, ``across-polygons`` and ``bit-mask`` do: whole numbers of 1/4096 pixel."""
+    count = np.zeros((size, size), np.int64)
+    polygons = np.zeros((len(points), 3, 3), np.float32)
+    polygons[..., :2] = points
+    polygons[..., 1] = size - polygons[..., 1]
+    _stamp_cover(polygons, *new_setup(), count)
+    return Cover(count[::-1] > 0, int(count.sum()))
+
+
+def quads(points: NDArray[np.float64], size: int) -> Cover:
+    """Cover as ``micropolygon`` does: four float32 edge functions of a quad, whose last corner is doubled here."""
+    tiles = screen_tiles(size, size, TILE, 4)
+    vertices = np.zeros((len(points), 16, 4), np.float32)
+    vertices[..., :2] = points[:, 2:, :]
+    vertices[:, 0, :2], vertices[:, 1, :2] = points[:, 0], points[:, 1]
+    vertices[..., 1] = size - vertices[..., 1]
+    count = np.full(tiles.total, len(points), np.uint32)
+    lists = np.tile(np.arange(len(points), dtype=np.uint32), tiles.total)
+    start = (np.arange(tiles.total) * len(points)).astype(np.uint32)
+    simt = load_machine(MACHINE).simt
+    _, depth, overdraw, _ = tile_raster(vertices, count, start, lists, tiles, size, size, simt)
+    assert overdraw is not None  # noqa: S101 - counting is on
+    return Cover(depth[::-1] < 1, int(overdraw.sum()))
+
+
+def _screen(points: NDArray[np.float64], size: int) -> NDArray[np.float32]:
+    """Corners as Ru's vertex shading leaves them: pixels right and down, depth, 1/w."""
+    flat = np.asarray(points, np.float64).reshape(-1, 2)
+    return np.stack([flat[:, 0], size - flat[:, 1], 0 * flat[:, 0], 1 + 0 * flat[:, 0]], axis=1).astype(np.float32)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
+    """Test every pixel of every triangle's box."""
+    for t in range(len(triangles)):
+        x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
+        twice = area(x0, y0, x1, y1, x2, y2)
+        if twice == np.float32(0.0):
+            continue
+        left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, count.shape[1], count.shape[0])
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                a, b, c = barycentric(
+                    x0, y0, x1, y1, x2, y2, _ONE / twice, np.float32(x) + _HALF, np.float32(y) + _HALF
+                )
+                count[y, x] += inside(a, b, c)
+
+
+@njit(cache=True, nogil=True)
+def _stamp_cover(polygons: Any, edges: Any, boxes: Any, depths: Any, snapped: Any, count: Any) -> None:
+    """Test every pixel of every polygon's box."""
+    for p in range(len(polygons)):
+        set_up(polygons[p], edges, boxes, depths, snapped)
+        for y in range(max(boxes[0, 1] // STEP, 0), min(boxes[0, 3] // STEP + 1, count.shape[0])):
+            for x in range(max(boxes[0, 0] // STEP, 0), min(boxes[0, 2] // STEP + 1, count.shape[1])):
+                count[y, x] += covering_triangle(edges, x * STEP + STEP // 2, y * STEP + STEP // 2) >= 0
+
+
+METHODS: dict[str, Method] = {
+    "cudaraster, freepipe: 1/16 pixel": by_pipeline("cudaraster", cull_backfaces=False, mode="color"),
+    "hardware: 1/256 pixel": by_pipeline("hardware", cull_backfaces=False),
+    "stamps: 1/4096 pixel": stamp,
+    "tiled, per-primitive: float32 barycentrics": barycentrics,
+    "binned: float32 edge planes": edge_planes,
+    "micropolygon: float32 edges of a quad": quads,
+}

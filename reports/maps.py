@@ -1,0 +1,63 @@
+"""Maps over two parameters: a panel a method, a cell a run, all on one scale."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reports.style import HEAT, figure
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = 3  # panels side by side
+
+
+def value_maps(
+    maps: "dict[str, pd.DataFrame]",
+    path: Path,
+    *,
+    title: str,
+    unit: str,
+    x_label: str,
+    y_label: str,
+    log_x: bool = False,
+    log_y: bool = False,
+    top: float = 1.0,
+) -> None:
+    """Draw tables whose columns are x and whose index is y; NaN stays white.
+
+    Parameters
+    ----------
+    maps : dict of str to DataFrame
+        A panel each.
+    path : Path
+        PNG to write.
+    title, unit, x_label, y_label : str
+    log_x, log_y : bool
+        Where the values of an axis grow by a factor.
+    top : float
+        Value of the brightest colour.
+    """
+    columns = min(COLUMNS, len(maps))
+    rows = -(-len(maps) // columns)
+    size = (5.2 * columns, 3.2 * rows + 0.6)
+    with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
+        for axes, (name, table) in zip(grid.flat, maps.items(), strict=False):
+            x, y = (_edges(np.asarray(v, np.float64), log) for v, log in ((table.columns, log_x), (table.index, log_y)))
+            image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
+            axes.grid(visible=False)
+            axes.set(title=name, xlabel=x_label, ylabel=y_label)
+            axes.figure.colorbar(image, ax=axes, label=unit)
+            axes.set_xscale("log" if log_x else "linear")
+            axes.set_yscale("log" if log_y else "linear")
+        for axes in grid.flat[len(maps) :]:
+            axes.set_visible(False)
+
+
+def _edges(values: np.ndarray, log: bool) -> np.ndarray:
+    """Borders of cells around values."""
+    at = np.log(values) if log else values
+    middle = (at[1:] + at[:-1]) / 2
+    edges = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return np.exp(edges) if log else edges
