@@ -8,11 +8,12 @@ the screen: it does not depend on the scene. The sample pattern, the radius and 
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.errors import TilestampError
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.ru2016.fragment_shading import BLOCK, Fragments
 from simulator.stages.ru2016.vertex_shading import EyeSpace
 from simulator.stages.thread_per_item import Access, thread_per_item
@@ -84,9 +85,12 @@ def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: 
             light[y, x] = _ONE - np.float32(found) / np.float32(len(samples))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
-def _ambient_occlusion(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, light: Any) -> None:
-    for y in prange(len(w)):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _ambient_occlusion(
+    part: int, parts: int, w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, light: Any
+) -> None:
+    """Light of a share of the rows."""
+    for y in range(part * len(w) // parts, (part + 1) * len(w) // parts):
         _row(w, normals, turns, samples, scales, relative, y, light)
 
 
@@ -113,7 +117,10 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[
     if eye.scales[2] == 0.0:
         raise TilestampError("ambient occlusion needs a perspective camera, this one is a parallel projection")
     light = np.ones(fragments.w.shape, np.float32)
-    _ambient_occlusion(fragments.w, fragments.normals, noise(), hemisphere(), eye.scales, np.float32(RADIUS), light)
+    for_parts(
+        _ambient_occlusion, parts_of(len(light)), fragments.w, fragments.normals, noise(), hemisphere(), eye.scales,
+        np.float32(RADIUS), light,
+    )  # fmt: skip
     loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
     stores = (Access("occlusion", 4, 1),)
     return light, thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)

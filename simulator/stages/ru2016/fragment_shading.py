@@ -9,11 +9,12 @@ from enum import IntEnum
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.scenes.texture import TextureChains, add_bilinear, nearest
 from simulator.scenes.textured_mesh import Geometry
 from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, Visible
@@ -106,12 +107,13 @@ def _interpolate_row(
         depths[y, x] = w
 
 
-@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _interpolate(
-    screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any, visible: Any,
-    perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
+    part: int, parts: int, screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any,
+    visible: Any, perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
 ) -> None:  # fmt: skip
-    for y in prange(len(visible)):
+    """Attributes of a share of the rows."""
+    for y in range(part * len(visible) // parts, (part + 1) * len(visible) // parts):
         _interpolate_row(
             screen, triangles, vertex_uvs, vertex_normals, vertex_colors, visible, y,
             perspective, uvs, normals, colors, depths,
@@ -132,9 +134,9 @@ def interpolate(mesh: Geometry, vertices: ShadedVertices, visible: Visible, *, p
     shape = visible.triangles.shape
     uvs, normals, colors = (np.zeros((*shape, n), np.float32) for n in (2, 3, 3))
     fragments = Fragments(uvs, normals, colors, np.zeros(shape, np.float32))
-    _interpolate(
-        vertices.screen, mesh.triangles, mesh.uvs, vertices.normals, mesh.colors, visible.triangles,
-        perspective, *fragments,
+    for_parts(
+        _interpolate, parts_of(shape[0]), vertices.screen, mesh.triangles, mesh.uvs, vertices.normals, mesh.colors,
+        visible.triangles, perspective, *fragments,
     )  # fmt: skip
     return fragments
 
@@ -162,12 +164,13 @@ def _shade_row(
             out[y, x, c] = np.uint8(min(max(value, _ZERO), _ONE) * np.float32(255.0) + _HALF)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _shade(
-    visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any, colors: Any, light: Any,
-    out: Any,
+    part: int, parts: int, visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any,
+    colors: Any, light: Any, out: Any,
 ) -> None:  # fmt: skip
-    for y in prange(len(visible)):
+    """Colours of a share of the rows."""
+    for y in range(part * len(visible) // parts, (part + 1) * len(visible) // parts):
         _shade_row(visible, texture_ids, chains, bilinear, uvs, normals, colors, light, y, out)
 
 
@@ -203,7 +206,9 @@ def fragment_shading(
     height, width = visible.triangles.shape
     image = np.zeros((height, width, 3), np.uint8)
     bilinear = texture_filter == "bilinear"
-    _shade(visible.triangles, mesh.texture_ids, chains, bilinear, *fragments[:3], light, image)
+    for_parts(
+        _shade, parts_of(height), visible.triangles, mesh.texture_ids, chains, bilinear, *fragments[:3], light, image
+    )
     pixels = width * height
     colors = Access("colors", 12, 3)
     return image, [

@@ -11,12 +11,13 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.coalescing import transactions
 from models.launch import Stream
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.ru2016.tile_lists import TileLists
 from simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
@@ -122,11 +123,14 @@ def _band(
             events[i, 8] = len(listed)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _tiled_raster(
-    screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any, events: Any
-) -> None:
-    for tile_row in prange((depth.shape[0] + tile - 1) // tile):
+    part: int, parts: int, screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int,
+    visible: Any, depth: Any, events: Any,
+) -> None:  # fmt: skip
+    """Rasterize a share of the rows of tiles."""
+    rows = (depth.shape[0] + tile - 1) // tile
+    for tile_row in range(part * rows // parts, (part + 1) * rows // parts):
         _band(screen, triangles, starts, entries, tile, warp, visible, depth, tile_row, events)
 
 
@@ -159,7 +163,8 @@ def tiled_raster(
     visible = Visible(np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.float32))
     tiles = len(lists.starts) - 1
     events = np.zeros((tiles, len(TiledRasterEvent)), np.int64)
-    _tiled_raster(screen, triangles, *lists, tile, simt.warp, *visible, events)
+    parts = parts_of(-(-height // tile))
+    for_parts(_tiled_raster, parts, screen, triangles, *lists, tile, simt.warp, *visible, events)
     _add_traffic(events, simt, tile)
     total = events.sum(axis=0)
     drawn = len(np.unique(lists.entries))
