@@ -89,6 +89,26 @@ def test_the_pipeline_puts_the_top_row_first():
     assert frame.works[0].stage == "hardware"
 
 
+@pytest.mark.parametrize(("depth_format", "seen"), [("fixed16", 0), ("fixed24", 1), ("fixed32", 1), ("float32", 1)])
+def test_sixteen_bits_cannot_tell_two_depths_that_the_others_can(depth_format, seen):
+    far, near = flat(LARGE, 0.25)[0], flat(LARGE, 0.25 - 2.0**-18)[0]
+    both = np.vstack([far, near])
+    frame, work, _ = hardware(both, np.arange(6, dtype=np.int32).reshape(2, 3), 64, 64, depth_format=depth_format)
+    assert set(frame.ids[frame.ids >= 0]) == {seen}
+    assert work.streams[2].bytes == work.items["z"] * (2 if depth_format == "fixed16" else 4)
+
+
+def test_depth_is_kept_in_units_of_its_format():
+    kept = {
+        name: hardware(*flat(LARGE, 0.5), 64, 64, depth_format=name)[0].depth.min()
+        for name in ("fixed16", "fixed24", "fixed32", "float32")
+    }
+    assert kept["fixed16"] == round(0.75 * 65535)
+    assert kept["fixed24"] == pytest.approx(0.75 * 16777215, abs=1)
+    assert kept["fixed32"] == pytest.approx(0.75 * 2**32, abs=256)
+    assert np.uint32(kept["float32"]).view(np.float32) == 0.75
+
+
 @pytest.mark.parametrize(("size", "bits"), [((0, 5), 8), ((20000, 5), 8), ((8, 8), 3)])
 def test_sizes_and_bits_that_cannot_be_are_refused(size, bits):
     with pytest.raises(TilestampError, match="hardware"):

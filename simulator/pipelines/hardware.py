@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
+from simulator.stages.depth_format import DepthFormat
 from simulator.stages.hardware import SUBPIXEL_BITS
 from simulator.stages.hardware import hardware as draw
 from simulator.stages.liu2010.freepipe_shade import pixel_colors
@@ -23,6 +24,7 @@ def hardware(
     *,
     cull_backfaces: bool = True,
     bits: int = SUBPIXEL_BITS,
+    depth_format: DepthFormat = "fixed32",
 ) -> Frame:
     """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate.
 
@@ -34,10 +36,14 @@ def hardware(
         Leave out what is clockwise on the screen.
     bits : int
         Sub-pixel bits, 4 to 8.
+    depth_format : {"fixed16", "fixed24", "fixed32", "float32"}
+        How depth is kept, in 2 or 4 bytes a pixel.
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    frame, work, facts = draw(positions, mesh.triangles, width, height, cull_backfaces=cull_backfaces, bits=bits)
+    frame, work, facts = draw(
+        positions, mesh.triangles, width, height, cull_backfaces=cull_backfaces, bits=bits, depth_format=depth_format
+    )
     works: list[Any] = [work]
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
     return Frame(image[::-1], frame.depth[::-1], works, frame.ids[::-1], facts=facts)

@@ -3,10 +3,11 @@
 A GPU's own pipe takes primitives in order: it fetches and transforms vertices, culls, sets up, walks the 2x2 quads of
 pixels that a triangle covers, tests depth before shading, and writes what is left. Each unit has a rate in the machine
 file, and the slowest sets the time. The counts here are exact for the coverage rule of cudaraster (section 6) at
-``bits`` sub-pixel bits (8, as hardware has) and for depth tests in input order.
+``bits`` sub-pixel bits (8, as hardware has) and for depth tests in input order. The depth plane is evaluated in float32
+and kept in one of the formats of graphics interfaces: 16, 24 or 32 bits of fixed point, or float32.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numba import njit
@@ -15,26 +16,26 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from models.launch import Stream
 from simulator.parallel import for_parts
-from simulator.stages.liu2010.freepipe_triangle import Pieces, _fixed_depth, _start_edges, make_pieces
+from simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
+from simulator.stages.liu2010.freepipe_triangle import Pieces, _start_edges, make_pieces
 from simulator.work import FixedFunctionWork
 
 SUBPIXEL_BITS = 8
 MAX_SIDE = 16384  # pixels, the limit of Direct3D 11 hardware
 STRIPS = 4  # of rows, drawn side by side
-FAR = 2**32 - 1
 QUADS, Z_TESTS, WRITES = 0, 1, 2  # columns of a strip's counts
-INDEX_BYTES, VERTEX_BYTES, DEPTH_BYTES, COLOR_BYTES = 4, 32, 4, 4
+INDEX_BYTES, VERTEX_BYTES, COLOR_BYTES = 4, 32, 4
 
 
 class HardwareFrame(NamedTuple):
     """What is left in the frame buffer; row 0 is the bottom row."""
 
     ids: NDArray[np.int32]  # (H, W) input triangle, -1 where there is none
-    depth: NDArray[np.uint32]  # (H, W) fixed point, 2**32 - 1 where there is none
+    depth: NDArray[np.uint32]  # (H, W) units of the format, or bits of a float; the farthest where there is none
 
 
 @njit(cache=True, nogil=True)
-def _quad(pieces, p, t, edge, x, y, corner, rows, bits, ids, depth, counts):
+def _quad(pieces, p, t, edge, x, y, corner, rows, bits, scale, ids, depth, counts):
     """Test the four pixels of one quad, whose lower-left pixel is (x, y); draw those of the strip's rows."""
     tests = 0
     for j in range(2):
@@ -49,7 +50,7 @@ def _quad(pieces, p, t, edge, x, y, corner, rows, bits, ids, depth, counts):
                 continue
             tests += 1
             right, up = np.float32((column - corner[0]) << bits), np.float32((row - corner[2]) << bits)
-            z = _fixed_depth(pieces.depth[p, 0] + pieces.depth[p, 1] * right + pieces.depth[p, 2] * up)
+            z = stored_depth(pieces.depth[p, 0] + pieces.depth[p, 1] * right + pieces.depth[p, 2] * up, scale)
             if z < depth[row, column]:
                 depth[row, column], ids[row, column] = z, t
                 counts[WRITES] += 1
@@ -58,7 +59,7 @@ def _quad(pieces, p, t, edge, x, y, corner, rows, bits, ids, depth, counts):
 
 
 @njit(cache=True, nogil=True)
-def _draw_strip(part, parts, pieces, bits, cull, ids, depth, counts):
+def _draw_strip(part, parts, pieces, bits, scale, cull, ids, depth, counts):
     """Draw all triangles, in order, to the rows of a strip, which begins at an even one."""
     pairs = (ids.shape[0] + 1) // 2
     first_row, end_row = 2 * (pairs * part // parts), min(2 * (pairs * (part + 1) // parts), ids.shape[0])
@@ -72,7 +73,7 @@ def _draw_strip(part, parts, pieces, bits, cull, ids, depth, counts):
             for y in range(max(np.int64(box[2]) & -2, first_row), min(np.int64(box[3]) + 1, end_row), 2):
                 _start_edges(pieces.corner[p], bits, left, y, edge)
                 for x in range(left, np.int64(box[1]) + 1, 2):
-                    _quad(pieces, p, t, edge, x, y, box, end_row, bits, ids, depth, counts[part])
+                    _quad(pieces, p, t, edge, x, y, box, end_row, bits, scale, ids, depth, counts[part])
                     for k in range(3):
                         edge[k] -= 2 * edge[4 + 2 * k]
 
@@ -85,6 +86,7 @@ def hardware(
     *,
     cull_backfaces: bool = True,
     bits: int = SUBPIXEL_BITS,
+    depth_format: DepthFormat = "fixed32",
 ) -> tuple[HardwareFrame, FixedFunctionWork, dict[str, Any]]:
     """Draw triangles in input order, and count what each unit sees.
 
@@ -99,6 +101,8 @@ def hardware(
         Leave out what is clockwise on the screen.
     bits : int
         Sub-pixel bits of the snapped corners, 4 to 8.
+    depth_format : {"fixed16", "fixed24", "fixed32", "float32"}
+        How depth is kept.
 
     Returns
     -------
@@ -119,14 +123,17 @@ def hardware(
         raise TilestampError(f"size {width}x{height}: hardware draws 1 to {MAX_SIDE} pixels in each direction")
     if not 4 <= bits <= 8:
         raise TilestampError(f"bits {bits}: hardware snaps to 4 to 8 sub-pixel bits")
+    if depth_format not in DEPTHS:
+        raise TilestampError(f"depth_format {depth_format}: hardware has {', '.join(get_args(DepthFormat))}")
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
         raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     pieces = make_pieces(positions, triangles, width, height, bits)
-    ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.uint32)
+    depths = DEPTHS[depth_format]
+    ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), depths.far, np.uint32)
     counts = np.zeros((STRIPS, 3), np.int64)
-    for_parts(_draw_strip, STRIPS, pieces, bits, cull_backfaces, ids, depth, counts)
+    for_parts(_draw_strip, STRIPS, pieces, bits, depths.scale, cull_backfaces, ids, depth, counts)
     quads, tests, writes = (int(n) for n in counts.sum(axis=0))
-    work, rasterized = _work(positions, triangles, pieces, cull_backfaces, quads, tests, writes)
+    work, rasterized = _work(positions, triangles, pieces, cull_backfaces, quads, tests, writes, depths.bytes)
     facts = {"rasterized": rasterized, "quad_efficiency": tests / max(4 * quads, 1)}
     return HardwareFrame(ids, depth), work, facts
 
@@ -168,6 +175,7 @@ def _work(
     quads: int,
     tests: int,
     writes: int,
+    depth_bytes: int,
 ) -> tuple[FixedFunctionWork, int]:
     """Items of the units and the buffers that they touch; returns the triangles that reach the rasterizer too."""
     drawn = (pieces.box[:, 1] >= pieces.box[:, 0]) & (pieces.box[:, 3] >= pieces.box[:, 2])
@@ -188,8 +196,8 @@ def _work(
     streams = (
         Stream("triangles", "load", indices, indices),
         Stream("positions", "load", vertices, vertices),
-        Stream("depth", "load", tests * DEPTH_BYTES, tests * DEPTH_BYTES),
-        Stream("depth", "store", writes * DEPTH_BYTES, writes * DEPTH_BYTES),
+        Stream("depth", "load", tests * depth_bytes, tests * depth_bytes),
+        Stream("depth", "store", writes * depth_bytes, writes * depth_bytes),
         Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
     )
     events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
