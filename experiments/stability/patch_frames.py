@@ -57,18 +57,31 @@ def split(
     simt: Simt | None = None,
 ) -> Split:
     """Bound and split, and dice."""
-    simt = simt or _simt(MACHINE)
+    simt = simt or simt_of(MACHINE)
     limits = {"near": near, "min_depth": min_depth, "max_depth": max_depth}
     subpatches, works = bound_and_split(points, matrix, width, height, bound, simt, **limits)  # type: ignore[arg-type]
     grids, diced = dice(points, subpatches, matrix, width, height, simt)
     return Split(subpatches, grids, works + diced)
 
 
+def dice_again(
+    points: NDArray[np.float32],
+    subpatches: SubPatches,
+    chosen: NDArray[np.bool_],
+    matrix: ArrayLike,
+    width: int,
+    height: int,
+) -> list[Work]:
+    """Works of dicing the chosen sub-patches once more."""
+    part = SubPatches(*(array[chosen] for array in subpatches[:4]), subpatches.passes)
+    return dice(points, part, matrix, width, height, simt_of(MACHINE))[1]
+
+
 def draw(
     grids: Grids, width: int, height: int, *, tile: int = 8, bound: float = 4.0, simt: Simt | None = None
 ) -> Drawn:
     """Bucketing and tile raster; ``bound`` decides how many tiles a grid may touch."""
-    simt = simt or _simt(MACHINE)
+    simt = simt or simt_of(MACHINE)
     tiles = screen_tiles(width, height, tile, bound)
     count, start, lists, works = bucket(grids.boxes, tiles, simt)
     image, _, hits, drawn = tile_raster(grids.vertices, count, start, lists, tiles, width, height, simt)
@@ -104,5 +117,6 @@ def flat_patch(corners: ArrayLike) -> NDArray[np.float32]:
 
 
 @cache
-def _simt(machine: str) -> Simt:
+def simt_of(machine: str) -> Simt:
+    """Give the SIMT shape of a machine."""
     return load_machine(machine).simt

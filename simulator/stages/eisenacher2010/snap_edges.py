@@ -1,0 +1,140 @@
+"""No cracks: the finer of two neighbours follows the edge of the coarser (not in Eisenacher & Loop 2010).
+
+"Cracks resulting from adaptive subdivision need to be taken care of" (section 5). Where neighbours are split to
+different depths, the finer one has vertices between those of the coarser, and off the straight lines that those span.
+Here such vertices are put on these lines. Neighbours are found by a table of the sub-patches of the final queue: for
+each edge the cells of growing size on its other side are looked up, across edges that patches share as well. Coarse
+sub-patches come first, because their own corners may lie on the edge of one that is coarser still.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.stages.eisenacher2010.bound_and_split import SubPatches
+from simulator.stages.eisenacher2010.dice import Grids
+
+_I64 = NDArray[np.int64]
+EDGES = np.array([[0, 1, 2, 3], [12, 13, 14, 15], [0, 4, 8, 12], [3, 7, 11, 15]])  # points by edge: v 0, v 1, u 0, u 1
+SEGMENTS = 3  # of a grid's edge
+
+
+class Snapped(NamedTuple):
+    """Grids without cracks, and what that took."""
+
+    grids: Grids
+    touched: NDArray[np.bool_]  # (N,) sub-patches with a vertex that was looked at
+    lookups: int  # in the table of sub-patches
+
+
+def shared_edges(points: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Neighbours of patches: (P, 4, 3) of patch, edge, and whether it runs the other way; -1 where there is none.
+
+    Parameters
+    ----------
+    points : ndarray, (P, 16, 4), float32
+        Edges are shared where all four control points are equal.
+    """
+    found = np.full((len(points), 4, 3), -1, np.int64)
+    seen: dict[bytes, tuple[int, int]] = {}
+    for patch in range(len(points)):
+        for edge in range(4):
+            along = points[patch, EDGES[edge]]
+            for backwards, key in enumerate((along.tobytes(), along[::-1].tobytes())):
+                if key in seen:
+                    other = seen[key]
+                    found[patch, edge] = *other, backwards
+                    found[other] = patch, edge, backwards
+                    break
+            seen[along.tobytes()] = patch, edge
+    return found
+
+
+def snap_edges(subpatches: SubPatches, grids: Grids, shared: NDArray[np.int64]) -> Snapped:
+    """Put the vertices of finer sub-patches on the edges of their coarser neighbours.
+
+    Parameters
+    ----------
+    subpatches : SubPatches
+    grids : Grids
+        Diced from them.
+    shared : ndarray, (P, 4, 3), int64
+        Of ``shared_edges``.
+    """
+    patch, level, i, j = (array.astype(np.int64) for array in subpatches[:4])
+    keys = _keys(patch, level, i, j)
+    order = np.argsort(keys)
+    table = keys[order]
+    vertices, touched, lookups = grids.vertices.copy(), np.zeros(len(keys), np.bool_), 0
+    for depth in np.unique(level)[1:]:
+        cells = np.flatnonzero(level == depth)
+        for edge in range(4):
+            fine, other, other_edge, along = _across(cells, edge, depth, patch, i, j, shared)
+            for up in range(1, int(depth) + 1):
+                lookups += len(fine)
+                at, known = _find(table, other, other_edge, along, int(depth), up)
+                _snap(vertices, fine[known], edge, order[at[known]], other_edge[known], along[known], up)
+                touched[fine[known]] = True
+                fine, other, other_edge, along = (a[~known] for a in (fine, other, other_edge, along))
+    return Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
+
+
+def _keys(patch: _I64, level: _I64, i: _I64, j: _I64) -> _I64:
+    return patch << 32 | level << 28 | i << 14 | j
+
+
+def _across(
+    cells: _I64, edge: int, depth: int, patch: _I64, i: _I64, j: _I64, shared: _I64
+) -> tuple[_I64, _I64, _I64, _I64]:
+    """What lies on the other side of an edge, for cells of one depth.
+
+    Returns the cells that have a neighbour; its patch; 4 times the row or column of its cell plus the edge of the cell;
+    and the cell's place along the edge, negative (-1 - place) where the edge runs the other way.
+    """
+    last = (1 << int(depth)) - 1
+    row, place = (j[cells], i[cells]) if edge < 2 else (i[cells], j[cells])
+    inside = row > 0 if edge % 2 == 0 else row < last
+    step = -1 if edge % 2 == 0 else 1
+    link = shared[patch[cells], edge]
+    kept = inside | (link[:, 0] >= 0)
+    line = np.where(inside, row + step, np.where(link[:, 1] % 2 == 0, 0, last))
+    facing = np.where(inside, edge ^ 1, link[:, 1])
+    along = np.where(~inside & (link[:, 2] == 1), -1 - place, place)
+    other = np.where(inside, patch[cells], link[:, 0])
+    return cells[kept], other[kept], (4 * line + facing)[kept], along[kept]
+
+
+def _find(
+    table: _I64, other: _I64, other_edge: _I64, along: _I64, depth: int, up: int
+) -> tuple[_I64, NDArray[np.bool_]]:
+    """Look up the cells ``up`` levels coarser on the other side."""
+    place = np.where(along < 0, (1 << depth) + along, along) >> up
+    line, by_row = other_edge // 4 >> up, other_edge % 4 < 2
+    i, j = np.where(by_row, place, line), np.where(by_row, line, place)
+    keys = _keys(other, np.full(len(other), depth - up), i, j)
+    at = np.minimum(np.searchsorted(table, keys), len(table) - 1)
+    return at, table[at] == keys
+
+
+def _snap(
+    vertices: NDArray[np.float32], fine: _I64, edge: int, coarse: _I64, other_edge: _I64, along: _I64, up: int
+) -> None:
+    """Move the four vertices of an edge of the fine grids to the polyline of the coarse ones."""
+    place = np.where(along < 0, -1 - along, along)
+    size = SEGMENTS << up
+    for k in range(SEGMENTS + 1):
+        at = (SEGMENTS * place + k) % size  # in the coarse cell, in steps of the fine one
+        at = np.where((at == 0) & (k == SEGMENTS), size, at)
+        at = np.where(along < 0, size - at, at)
+        m = np.minimum(at >> up, SEGMENTS - 1)
+        share = ((at - (m << up)) / (1 << up)).astype(np.float32)[:, None]
+        ends = EDGES[other_edge % 4]
+        rows = np.arange(len(fine))
+        first, second = vertices[coarse, ends[rows, m], :3], vertices[coarse, ends[rows, m + 1], :3]
+        vertices[fine, EDGES[edge][k], :3] = first + share * (second - first)
+
+
+def _boxes(vertices: NDArray[np.float32]) -> NDArray[np.float32]:
+    low, high = vertices[:, :, :2].min(axis=1), vertices[:, :, :2].max(axis=1)
+    return np.concatenate([low, high], axis=1)
