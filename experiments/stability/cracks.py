@@ -75,11 +75,11 @@ def frame(bound: float, seed: int, cure: Cure) -> Drawn:
 
 def cracks(bound: float, seed: int, cure: Cure = "as published") -> NDArray[np.bool_]:
     """Background well inside the sheet, (H, W)."""
-    inside = frame(bound, seed, "one depth").hits > 0
+    inside: NDArray[np.bool_] = frame(bound, seed, "one depth").hits > 0
     for _ in range(INSIDE):
         around = np.pad(inside, 1)
         inside = inside & around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
-    return inside & (frame(bound, seed, cure).hits == 0)
+    return np.logical_and(inside, frame(bound, seed, cure).hits == 0)
 
 
 def crack_pixels(bound: float, cure: Cure = "as published") -> int:
@@ -166,11 +166,10 @@ def _boundary(table: "pd.DataFrame", cure: Cure) -> Boundary:
 
 def _notes(table: "pd.DataFrame") -> list[str]:
     """What is left."""
-    small = table[(table.cure == "as published") & (table.bound <= 8)]  # noqa: PLR2004 - the paper's bounds
+    small = table[(table.cure == "as published") & (table.bound <= 8)]
     left = {cure: int(table[table.cure == cure].crack_pixels.sum()) for cure in CURES}
     covered = sum(int((frame(BOUNDS[0], seed, "as published").hits > 0).sum()) for seed in SEEDS)
     return [
-        f"At the paper's bounds of 4 and 8 pixels {small.crack_pixels.sum()} of 2 x {covered} covered pixels are cracks.",
-        f"All bounds together: {left['as published']} crack pixels as published, {left['snapped edges']} with snapped "
-        f"edges, {left['one depth']} with one depth.",
+        f"At the paper's bounds of 4 and 8 pixels {small.crack_pixels.sum()} of {2 * covered} covered pixels are cracks.",
+        "Crack pixels at all bounds together: " + ", ".join(f"{n} {cure}" for cure, n in left.items()) + ".",
     ]

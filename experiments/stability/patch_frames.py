@@ -73,7 +73,8 @@ def dice_again(
     height: int,
 ) -> list[Work]:
     """Works of dicing the chosen sub-patches once more."""
-    part = SubPatches(*(array[chosen] for array in subpatches[:4]), subpatches.passes)
+    patch, level, i, j, passes = subpatches
+    part = SubPatches(patch[chosen], level[chosen], i[chosen], j[chosen], passes)
     return dice(points, part, matrix, width, height, simt_of(MACHINE))[1]
 
 
