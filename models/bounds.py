@@ -18,6 +18,8 @@ first requests reach them and end before the last answer is back, so a unit's ch
 that the units are many and alike; ``models.schedule`` does not.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from models.demand import Demand, demand
@@ -30,8 +32,19 @@ from models.traffic import Traffic
 SERVERS = ("dram", "l2", "atomic", "queue")  # of the whole chip
 
 
-def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
-    """Price one launch by its largest term.
+class Asked(NamedTuple):
+    """What a launch asks of a machine: all that is known before its time is."""
+
+    launch: Launch
+    machine: Machine
+    moved: Traffic
+    held: Residency
+    units: Demand
+    terms: dict[str, float]
+
+
+def asked_of(launch: Launch, machine: Machine, moved: Traffic) -> Asked:
+    """Demands of the units and cycles of the terms.
 
     Parameters
     ----------
@@ -46,11 +59,20 @@ def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
         A block that the machine cannot launch.
     """
     held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    asked = demand(launch, machine, moved)
-    terms = bound_terms(launch, machine, asked, held)
+    units = demand(launch, machine, moved)
+    return Asked(launch, machine, moved, held, units, bound_terms(launch, machine, units, held))
+
+
+def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
+    """Price one launch by its largest term; parameters as of ``asked_of``."""
+    return roofline(asked_of(launch, machine, moved))
+
+
+def roofline(asked: Asked) -> Timing:
+    """Take the largest term of what was asked."""
+    terms = asked.terms
     bound = max(terms, key=lambda name: terms[name])
-    cycles = terms["launch"] + longest(terms, asked)
-    return timing(launch, machine, moved, held, terms, cycles, bound)
+    return timing(asked, terms["launch"] + longest(terms, asked.units), bound, "bounds")
 
 
 def bound_terms(launch: Launch, machine: Machine, asked: Demand, held: Residency) -> dict[str, float]:
@@ -90,26 +112,18 @@ def slots(launch: Launch, machine: Machine, held: Residency) -> np.ndarray[tuple
     return dealt * (-(-launch.block // machine.sm.warp_size) if launch.dispatch == "warp_queue" else 1)
 
 
-def timing(
-    launch: Launch,
-    machine: Machine,
-    moved: Traffic,
-    held: Residency,
-    terms: dict[str, float],
-    cycles: float,
-    bound: str,
-    **details: float,
-) -> Timing:
+def timing(asked: Asked, cycles: float, bound: str, fidelity: str, **details: float) -> Timing:
     """Put a result together."""
     return Timing(
-        stage=launch.stage,
-        kernel=launch.kernel,
-        term_cycles=terms,
+        stage=asked.launch.stage,
+        kernel=asked.launch.kernel,
+        term_cycles=asked.terms,
         cycles=cycles,
-        milliseconds=cycles / machine.clock_hz * 1e3,
+        milliseconds=cycles / asked.machine.clock_hz * 1e3,
         bound=bound,
-        occupancy=held.occupancy,
-        dram_bytes=moved.dram_bytes,
-        l2_bytes=moved.l2_bytes,
-        details={"resident_blocks": float(held.blocks)} | details,
+        occupancy=asked.held.occupancy,
+        dram_bytes=asked.moved.dram_bytes,
+        l2_bytes=asked.moved.l2_bytes,
+        details={"resident_blocks": float(asked.held.blocks)} | details,
+        fidelity=fidelity,
     )

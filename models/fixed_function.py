@@ -65,4 +65,5 @@ def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
         occupancy=0.0,
         dram_bytes=moved.dram_bytes,
         l2_bytes=moved.l2_bytes,
+        fidelity="bounds",
     )

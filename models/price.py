@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal
 
+from models.auto import auto
 from models.bounds import bounds
 from models.errors import TilestampError
 from models.fixed_function import PipeLaunch, pipe_time
@@ -13,11 +14,13 @@ from models.schedule import schedule
 from models.timing import Timing
 from models.traffic import Traffic, traffic
 
-Fidelity = Literal["counts", "bounds", "schedule"]
-FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "schedule")
+Fidelity = Literal["counts", "bounds", "auto", "schedule"]
+FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "auto", "schedule")
 
 
-def price(launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: Fidelity = "schedule") -> list[Timing]:
+def price(
+    launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: Fidelity = "schedule", error: float = 0.0
+) -> list[Timing]:
     """Price the launches of one frame.
 
     Parameters
@@ -25,8 +28,11 @@ def price(launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: F
     launches : sequence of Launch or PipeLaunch
         In launch order: what a launch leaves in the cache, a later one finds there.
     machine : Machine
-    fidelity : {"counts", "bounds", "schedule"}
-        No time at all; a roofline for each launch; units of work played on the SMs.
+    fidelity : {"counts", "bounds", "auto", "schedule"}
+        No time at all; a roofline for each launch; the cheaper of its neighbours, launch by launch
+        (``models.auto``); units of work played on the SMs.
+    error : float
+        Relative error of time that ``auto`` may make against ``schedule``; 0 for ``models.auto.ERROR``.
 
     Returns
     -------
@@ -41,6 +47,8 @@ def price(launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: F
     if fidelity not in FIDELITIES:
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
     moved = traffic(launches, machine)
+    if fidelity == "auto":
+        return auto(launches, machine, moved, error)
     return [_one(launch, machine, bytes_, fidelity) for launch, bytes_ in zip(launches, moved, strict=True)]
 
 
@@ -58,4 +66,5 @@ def _counts(launch: Launch | PipeLaunch, machine: Machine, moved: Traffic) -> Ti
     occupancy = 0.0
     if isinstance(launch, Launch):
         occupancy = residency(machine, launch.block, launch.registers, launch.shared_bytes).occupancy
-    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, moved.dram_bytes, moved.l2_bytes)
+    bytes_ = moved.dram_bytes, moved.l2_bytes
+    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, *bytes_, fidelity="counts")

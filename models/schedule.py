@@ -16,17 +16,16 @@ Both loads change only when a unit starts or ends, so the play is exact and cost
 what a roofline cannot: idle SMs when units are few, SMs that are half empty, and the tail when units are unlike.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.bounds import bound_terms, longest, slots, timing
-from models.demand import Demand, demand
+from models.bounds import Asked, asked_of, longest, slots, timing
+from models.demand import Demand
 from models.launch import Launch
 from models.machine import Machine
-from models.occupancy import residency
 from models.timing import Timing
 from models.traffic import Traffic
 
@@ -56,25 +55,59 @@ def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
     TilestampError
         A block that the machine cannot launch.
     """
-    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    asked = demand(launch, machine, moved)
-    terms = bound_terms(launch, machine, asked, held)
-    sm, chip, alone = _grouped(asked)
-    interval = machine.sm.clock_mhz / machine.launch.blocks_per_us * launch.grid / max(1, len(alone))
-    places = slots(launch, machine, held)
-    end, last_start, busy = _play(sm, chip, alone, places, interval if launch.dispatch == "blocks" else 0.0)
-    if launch.dispatch != "blocks" and len(alone):  # persistent blocks start once
-        end += machine.latency.block_launch_cycles
-        last_start += machine.latency.block_launch_cycles
-    played = max(end, longest(terms, asked))
+    asked = asked_of(launch, machine, moved)
+    return played(asked, loads(asked))
+
+
+class Loads(NamedTuple):
+    """What is played: a row a unit.
+
+    Parameters
+    ----------
+    sm : ndarray, (units,)
+        Cycles of its SM.
+    chip : ndarray, (units, SERVERS)
+        Cycles of the servers of the chip.
+    alone : ndarray, (units,)
+        Cycles that it takes by itself.
+    places : ndarray, (sms,)
+        Units that each SM holds.
+    interval : float
+        Cycles from one start to the next; 0 where units are drawn from a queue.
+    """
+
+    sm: NDArray[np.float64]
+    chip: NDArray[np.float64]
+    alone: NDArray[np.float64]
+    places: NDArray[np.int64]
+    interval: float
+
+
+def loads(asked: Asked) -> Loads:
+    """What the units of a launch load the machine with."""
+    launch, machine = asked.launch, asked.machine
+    sm, chip, alone = _grouped(asked.units)
+    blocks = launch.dispatch == "blocks"
+    interval = machine.sm.clock_mhz / machine.launch.blocks_per_us * launch.grid / max(1, len(alone)) if blocks else 0.0
+    return Loads(sm, chip, alone, slots(launch, machine, asked.held), interval)
+
+
+def start_up(asked: Asked) -> float:
+    """Cycles before a persistent block draws its first unit; each block of a grid has its own in its chain."""
+    persistent = asked.launch.dispatch != "blocks" and len(asked.units.alone)
+    return asked.machine.latency.block_launch_cycles if persistent else 0.0
+
+
+def played(asked: Asked, units: Loads) -> Timing:
+    """Play the units of what was asked."""
+    end, last_start, busy = _play(*units)
+    terms = asked.terms
+    cycles = max(end + start_up(asked), longest(terms, asked.units))
     return timing(
-        launch,
-        machine,
-        moved,
-        held,
-        terms,
-        terms["launch"] + played,
-        _holds(terms, played, end - last_start, busy < machine.sm.count),
+        asked,
+        terms["launch"] + cycles,
+        _holds(terms, cycles, end - last_start, busy < asked.machine.sm.count),
+        "schedule",
         busy_sms=float(busy),
         tail_cycles=end - last_start,
     )

@@ -22,6 +22,13 @@ class Timing:
         Moved to or from DRAM, and through L2.
     details : dict of str to float
         What else a fidelity has to say: ``busy_sms``, ``tail_cycles``, ``resident_blocks``.
+    fidelity : str
+        The level that priced it; under ``auto`` the one that was chosen.
+    why : str
+        Why ``auto`` chose it.
+    error_bound : float
+        How far ``cycles`` can be below those of ``schedule``, relative to the latter, by the proof of
+        ``models.fidelity_bound``; NaN where nobody asked.
     """
 
     stage: str
@@ -34,6 +41,9 @@ class Timing:
     dram_bytes: float
     l2_bytes: float
     details: dict[str, float] = field(default_factory=dict)
+    fidelity: str = ""
+    why: str = ""
+    error_bound: float = float("nan")
 
     @property
     def terms(self) -> dict[str, float]:
