@@ -28,6 +28,8 @@ SHOWN = {  # column of the terminal table: how to print it
     "occupancy": ".2f",
     "milliseconds": ".3f",
     "bound": "s",
+    "fidelity": "s",
+    "why": "s",
 }
 
 
@@ -38,7 +40,7 @@ def render(
     machine: str = "gtx280",
     size: str = "1024x768",
     camera: str | None = None,
-    fidelity: Literal["counts", "bounds", "schedule"] = "schedule",
+    fidelity: Literal["counts", "bounds", "auto", "schedule"] = "schedule",
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[MapName | None, Parameter(name="--map")] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
@@ -68,7 +70,8 @@ def render(
     camera
         A view of the scene by name, or a JSON file (`FILE.json`, `FILE.json:KEY`).
     fidelity
-        counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine.
+        counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine; auto:
+        launch by launch bounds where it is proved to be near enough to schedule, which is the rest.
     output
         PNG file for the picture.
     map_
