@@ -78,6 +78,8 @@ class Latency(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     atomic_cycles: Positive
     barrier_cycles: Amount
     block_launch_cycles: Amount  # from a free place on the SM to the first instruction of the block put there
+    l1_cycles: Amount = 0.0  # described, not priced: no stage counts which loads L1 answers; 0: not known
+    l2_far_cycles: Amount = 0.0  # described, not priced: data beyond the near part of L2; 0: not known
 
 
 class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

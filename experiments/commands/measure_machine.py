@@ -31,7 +31,7 @@ def measure_machine(
         raise TilestampError(f"there is no folder {output.absolute().parent} to write {output.name} to")
     from experiments.validation.gpu import cupy
     from experiments.validation.machine_file import busy, machine_file
-    from experiments.validation.measuring import measure
+    from experiments.validation.measure import measure
 
     cp = cupy()
     properties = cp.cuda.runtime.getDeviceProperties(cp.cuda.Device().id)

@@ -35,13 +35,13 @@ def validate(
         if measurements is None:
             from experiments.validation.on_gpu import compare_here
 
-            table = compare_here(model, say)
+            table, remarks = compare_here(model, say)
         else:
             if not measurements.is_dir():
                 raise TilestampError(f"{measurements} is not a folder of measurements")
             from experiments.validation.stored import compare
 
-            table = compare(measurements, model, say)
+            table, remarks = compare(measurements, model, say), []
     if output is not None:
         table.to_csv(output, index=False)
     rows = [
@@ -54,6 +54,8 @@ def validate(
         rows,
         [""] * len(rows),
     )
+    for remark in remarks:
+        sys.stdout.write(f"! {remark}\n")
     tiles = fastest_tiles(table)
     if len(tiles):
         right = int(((tiles.ours == tiles.measured) | ~tiles.clear).sum())

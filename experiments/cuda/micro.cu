@@ -12,7 +12,7 @@ template <class F, class T, int CHAINS> static __device__ __forceinline__ void c
   long long start = clock64();
   for (int i = 0; i < n; i++) {
     #pragma unroll
-    for (int u = 0; u < 4; u++) {
+    for (int u = 0; u < 16; u++) {
       #pragma unroll
       for (int c = 0; c < CHAINS; c++) v[c] = step(v[c]);
     }
@@ -40,30 +40,35 @@ CHAIN(mul32, Imad, u32)
 CHAIN(sfu, Rsqrt, float)
 CHAIN(control, Compare, u32)
 
-// ---- latencies: pointer chases, barriers, awaited atomics ----
-extern "C" __global__ void chase_global(const u32* next, int n, long long* cycles, u32* out) {
-  u32 at = 0;
-  for (int i = 0; i < 64; i++) asm volatile("ld.global.cg.u32 %0, [%1];" : "=r"(at) : "l"(next + at));
+// ---- latencies: chains of loads, each of which fetches the address of the next; barriers; awaited atomics ----
+template <int L1> static __device__ __forceinline__ void chase(int n, u64* place, long long* cycles) {
+  u64 at = *place;  // where the last walk ended
   long long start = clock64();
-  for (int i = 0; i < n; i++) asm volatile("ld.global.cg.u32 %0, [%1];" : "=r"(at) : "l"(next + at));
-  out[0] = at;
-  cycles[0] = clock64() - start;
+  for (int i = 0; i < n; i++)
+    if (L1) asm volatile("ld.global.ca.u64 %0, [%0];" : "+l"(at));
+    else asm volatile("ld.global.cg.u64 %0, [%0];" : "+l"(at));
+  *place = at;
+  *cycles = clock64() - start;
 }
+extern "C" __global__ void chase_l1(int n, u64* place, long long* cycles) { chase<1>(n, place, cycles); chase<1>(n, place, cycles); }
+extern "C" __global__ void chase_l2(int n, u64* place, long long* cycles) { chase<0>(n, place, cycles); }
 extern "C" __global__ void chase_shared(int n, long long* cycles, u32* out) {
   __shared__ u32 next[1024];
-  for (int i = threadIdx.x; i < 1024; i += blockDim.x) next[i] = (i + 33) & 1023;
+  u32 base = (u32)__cvta_generic_to_shared(next);
+  for (int i = threadIdx.x; i < 1024; i += blockDim.x) next[i] = base + 4 * ((i + 33) & 1023);
   __syncthreads();
-  u32 at = threadIdx.x;
+  u32 at = base + 4 * threadIdx.x;
   long long start = clock64();
-  for (int i = 0; i < n; i++) at = ((volatile u32*)next)[at];
+  for (int i = 0; i < n; i++) asm volatile("ld.shared.u32 %0, [%0];" : "+r"(at));
   out[threadIdx.x] = at;
   cycles[0] = clock64() - start;
 }
-extern "C" __global__ void chase_atomic(u32* counter, int n, long long* cycles, u32* out) {
-  u32 at = 0;
+extern "C" __global__ void chase_atomic(u32* counters, u32 apart, int places, int n, long long* cycles, u32* out) {
+  u32 zero = (u32)(n >> 31);  // nothing is added, so that the chain goes on, and the compiler can't know
   long long start = clock64();
-  for (int i = 0; i < n; i++) at = atomicAdd(counter + (at >> 31), 1u);
-  out[0] = at;
+  for (int p = 0; p < places; p++)
+    for (int i = 0; i < n; i++) zero = atomicAdd(counters + (u64)p * apart + zero, zero);
+  out[0] = zero;
   cycles[0] = clock64() - start;
 }
 extern "C" __global__ void barriers(int n, long long* cycles) {
@@ -74,18 +79,17 @@ extern "C" __global__ void barriers(int n, long long* cycles) {
 }
 
 // ---- bandwidths ----
-extern "C" __global__ void read_all(const float4* a, u64 n, int rounds, float* out) {
+extern "C" __global__ void read_all(const float4* a, u64 mask, int rounds, float* out) {  // round after round, wrapping
   float sum = 0;
-  u64 step = (u64)gridDim.x * blockDim.x;
-  for (int r = 0; r < rounds; r++)
-    for (u64 i = blockIdx.x * (u64)blockDim.x + threadIdx.x; i + 3 * step < n; i += 4 * step) {
-      float4 v[4];
-      #pragma unroll
-      for (int k = 0; k < 4; k++) asm volatile("ld.global.cg.v4.f32 {%0,%1,%2,%3}, [%4];"
-        : "=f"(v[k].x), "=f"(v[k].y), "=f"(v[k].z), "=f"(v[k].w) : "l"(a + i + k * step));
-      #pragma unroll
-      for (int k = 0; k < 4; k++) sum += v[k].x + v[k].y + v[k].z + v[k].w;
-    }
+  u64 step = (u64)gridDim.x * blockDim.x, at = blockIdx.x * (u64)blockDim.x + threadIdx.x;
+  for (int r = 0; r < rounds; r++, at += 8 * step) {
+    float4 v[8];
+    #pragma unroll
+    for (int k = 0; k < 8; k++) asm volatile("ld.global.cg.v4.f32 {%0,%1,%2,%3}, [%4];"
+      : "=f"(v[k].x), "=f"(v[k].y), "=f"(v[k].z), "=f"(v[k].w) : "l"(a + (at + k * step & mask)));
+    #pragma unroll
+    for (int k = 0; k < 8; k++) sum += v[k].x + v[k].y + v[k].z + v[k].w;
+  }
   if (sum == 12345.678f) *out = sum;
 }
 extern "C" __global__ void scatter(u32* a, u64 mask, int rounds) {  // a 32-byte sector a lane, all over the buffer
@@ -97,14 +101,14 @@ extern "C" __global__ void read_l1(const float4* a, int rounds, long long* cycle
   float sum = 0;
   __syncthreads();
   long long start = clock64();
-  for (int r = 0; r < rounds; r++)
+  for (int r = 0; r < rounds; r++) {
+    float4 v[8];
     #pragma unroll
-    for (int k = 0; k < 4; k++) {
-      float4 v;
-      asm volatile("ld.global.ca.v4.f32 {%0,%1,%2,%3}, [%4];" : "=f"(v.x), "=f"(v.y), "=f"(v.z), "=f"(v.w)
-        : "l"(p + ((threadIdx.x + k * 256 + r * 32) & 1023)));
-      sum += v.x + v.y + v.z + v.w;
-    }
+    for (int k = 0; k < 8; k++) asm volatile("ld.global.ca.v4.f32 {%0,%1,%2,%3}, [%4];"
+      : "=f"(v[k].x), "=f"(v[k].y), "=f"(v[k].z), "=f"(v[k].w) : "l"(p + (threadIdx.x + r * 32 & 511) + k * 64));
+    #pragma unroll
+    for (int k = 0; k < 8; k++) sum += v[k].x;
+  }
   __syncthreads();
   if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
   if (sum == 12345.678f) *out = sum;

@@ -63,6 +63,21 @@ def microseconds(work: Callable[[], None], repeats: int = REPEATS) -> np.ndarray
     return np.array(times)
 
 
+def in_a_graph(work: Callable[[], None], copies: int) -> Callable[[], None]:
+    """Record ``copies`` of some launches in a CUDA graph; returns what replays it."""
+    cp = cupy()
+    work()  # compiles, and loads the code
+    stream = cp.cuda.Stream(non_blocking=True)
+    with stream:
+        stream.begin_capture()
+        for _ in range(copies):
+            work()
+        graph = stream.end_capture()
+    cp.cuda.Device().synchronize()
+    replay: Callable[[], None] = graph.launch
+    return replay
+
+
 def spread(values: Any) -> float:
     """Half of what lies between the first and the last decile, as a share of the median."""
     low, middle, high = np.percentile(values, [10, 50, 90])

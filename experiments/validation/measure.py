@@ -1,0 +1,32 @@
+"""All micro-benchmarks of ``tilestamp measure-machine``, in the order in which they build on each other."""
+
+from collections.abc import Iterator
+
+from experiments.validation.gpu import cupy
+from experiments.validation.measuring import Number, arithmetic, attribute, clock, device, latencies
+from experiments.validation.measuring_memory import atomics, bandwidths, launches
+from models.errors import TilestampError
+
+NEEDED_BYTES = 3 << 30
+
+
+def measure() -> Iterator[Number]:
+    """Measure the GPU at hand.
+
+    Raises
+    ------
+    TilestampError
+        No CuPy, no GPU, or too little free memory for buffers that no cache holds.
+    """
+    free = int(cupy().cuda.runtime.memGetInfo()[0])
+    if free < NEEDED_BYTES:
+        raise TilestampError(f"the GPU has {free >> 20} MiB free and this needs {NEEDED_BYTES >> 20}: is it in use?")
+    frequency = clock()
+    yield frequency
+    sms = attribute("MultiProcessorCount")
+    yield from device(sms)
+    yield from arithmetic(sms)
+    yield from latencies()
+    yield from bandwidths(sms, frequency.value)
+    yield from atomics(sms, frequency.value)
+    yield from launches()
