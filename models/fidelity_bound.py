@@ -20,9 +20,10 @@ ready, the machine is full, with what was resident and the blocks still to come:
 its SM can hold; or any one unit ends last, and its own start and run count. The lower one holds.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from models.schedule import Loads
@@ -46,71 +47,53 @@ def latest_end(units: Loads) -> Latest:
     units : Loads
         What is played.
     """
-    sm, chip, alone, places, interval = units
-    if not len(alone):
-        return Latest(0.0, 0.0, waiting=False)
-    taken = places[places > 0]
-    resident = int(taken.sum())
+    sm, alone = units.sm, units.alone
+    taken = units.places[units.places > 0]
+    resident, least, most = int(taken.sum()), int(taken.min()), int(taken.max())
     waiting = len(alone) > resident
-    least, most = int(taken.min()), int(taken.max())
+    if not len(alone):
+        return Latest(0.0, 0.0, waiting)
     together = min(most, -(-len(alone) // len(taken)) + most - least)  # of one SM: starts go where most places are free
-    low, high = _sum_lowest(sm / alone, least if waiting else 0), _sum_highest(sm / alone, together)
-    pace, share = _chord(low, high)
-    step = (pace * alone + share * most * sm) / resident if waiting else np.zeros(len(alone))
-    pace, served = _served(sm, chip, alone, taken, together, waiting=waiting)
-    start = _starts(step * pace, served, interval, resident)
-    longest = float(alone.max())
+    low, high = _extremes(sm / alone, least, together)
+    stretch, served = _served(units, taken, together, waiting=waiting)
+    own, shared = _chord(low, high)
+    full = (own * alone + shared * most * sm) * (stretch / resident) if waiting else np.zeros(len(alone))
     crowd = _chord(0.0, high)[1] * _sum_highest(sm, together)
+    longest = float(alone.max())
     tail = min(longest * max(1.0, high), longest + crowd)
-    end = min(float(start[-1]) + tail, float((start + alone * max(1.0, high)).max()))
-    return Latest(end, end - float(start[-1]), waiting)
+    left = _sum_highest(full + served, min(resident, len(alone)) - 1) if units.interval else 0.0
+    start, last = _starts(full, served, alone, units.interval, left, max(1.0, high))
+    end = min(start + tail, last)
+    return Latest(end, end - start, waiting)
 
 
-def _starts(step: Cycles, served: Cycles, interval: float, resident: int) -> Cycles:
-    """Latest start of each unit, with all that the chip's servers have left to do then."""
-    before = np.cumsum(step) - step
-    done = np.cumsum(served) - served
-    since = served.sum() - done - before
-    if interval:
-        left = min(resident, len(step)) - 1  # residents at the last moment at which a place was free
-        since[1:] += np.minimum(_sum_highest(step + served, left), before + done)[1:]
-        since += interval * np.arange(len(step))
-    else:
-        since[1:] = -np.inf
-    latest: Cycles = before + np.maximum.accumulate(since)
-    return latest
-
-
-def _served(
-    sm: Cycles, chip: Cycles, alone: Cycles, taken: NDArray[np.int64], together: int, *, waiting: bool
-) -> tuple[float, Cycles]:
+def _served(units: Loads, taken: NDArray[np.int64], together: int, *, waiting: bool) -> tuple[float, Cycles]:
     """How the chip stretches time: share of the SMs' own time that stays, and cycles that each unit adds."""
-    busiest = int(chip.sum(axis=0).argmax())
-    pace, served = 1.0, np.zeros(len(alone))
-    for k in range(chip.shape[1]):
-        column = chip[:, k]
-        if not column.any() or (k != busiest and (column <= chip[:, busiest]).all()):
+    calls = np.ascontiguousarray(units.chip.T)
+    totals = calls.sum(axis=1)
+    busiest = int(totals.argmax())
+    stretch, served = 1.0, np.zeros(len(units.alone))
+    for k in np.flatnonzero(totals):
+        if k != busiest and (calls[k] <= calls[busiest]).all():
             continue  # never the fullest
-        low, high = _server_load(column, sm, alone, taken, together)
-        slack, slope = _chord(low if waiting and k == busiest else 0.0, high)
-        served += slope * column
-        pace = slack if k == busiest else pace
-    return pace, served
+        low, high = _server_load(calls[k], units, taken, together)
+        own, shared = _chord(low if waiting and k == busiest else 0.0, high)
+        served += shared * calls[k]
+        stretch = own if k == busiest else stretch
+    return stretch, served
 
 
-def _server_load(
-    column: Cycles, sm: Cycles, alone: Cycles, taken: NDArray[np.int64], together: int
-) -> tuple[float, float]:
+def _server_load(calls: Cycles, units: Loads, taken: NDArray[np.int64], together: int) -> tuple[float, float]:
     """Lowest load of a server while every place is taken, and its highest at any time.
 
-    An SM of load S slows the calls of its residents too: by max(1, S), so they are never above column / sm.
+    An SM of load S slows the calls of its residents too: by max(1, S), so they are never above calls / sm.
     """
-    rate = column / alone
-    ratio = np.divide(column, sm, out=np.full(len(sm), np.inf), where=sm > 0)
-    least, sms = int(taken.min()), len(taken)
-    low = sms * min(_sum_lowest(rate, least), float(ratio.min()))
-    high = sms * min(_sum_highest(rate, together), float(ratio.max()))
-    return low, min(high, _sum_highest(rate, int(taken.sum())))
+    rate = calls / units.alone
+    ratio = np.divide(calls, units.sm, out=np.full(len(calls), np.inf), where=units.sm > 0)
+    low, high = _extremes(rate, int(taken.min()), together)
+    sms = len(taken)
+    high = sms * min(high, float(ratio.max()))
+    return sms * min(low, float(ratio.min())), min(high, _sum_highest(rate, int(taken.sum()))) if high > 1.0 else high
 
 
 def _chord(low: float, high: float) -> tuple[float, float]:
@@ -123,13 +106,56 @@ def _chord(low: float, high: float) -> tuple[float, float]:
     return 1.0 - slope * low, slope
 
 
-def _sum_highest(values: Cycles, count: int) -> float:
-    """Sum of the ``count`` highest."""
-    count = min(count, len(values))
-    return float(np.partition(values, len(values) - count)[len(values) - count :].sum()) if count > 0 else 0.0
+def _extremes(values: Cycles, few: int, many: int) -> tuple[float, float]:
+    """Sum of the ``few`` lowest, and of the ``many`` highest."""
+    return -_sum_highest(-values, few), _sum_highest(values, many)
 
 
-def _sum_lowest(values: Cycles, count: int) -> float:
-    """Sum of the ``count`` lowest."""
+@njit(cache=True, nogil=True)
+def _starts(full: Any, served: Any, alone: Any, interval: float, left: float, crowded: float) -> tuple[float, float]:
+    """Latest start of the last unit, and latest end of any, with all that the chip's servers have left to do then.
+
+    ``since`` belongs to the last moment at which a place was free but unit i was not ready; residents had ``left`` to
+    do.
+    """
+    before = 0.0  # that the units before this one keep the machine full
+    done = 0.0  # that they ask of the chip's servers
+    everything = 0.0
+    for i in range(len(served)):
+        everything += served[i]
+    since = everything
+    start = 0.0
+    end = 0.0
+    for i in range(len(full)):
+        if interval > 0.0 and i > 0:
+            since = max(since, i * interval + min(left, before + done) + everything - done - before)
+        start = before + since
+        end = max(end, start + alone[i] * crowded)
+        before += full[i]
+        done += served[i]
+    return start, end
+
+
+@njit(cache=True, nogil=True)
+def _sum_highest(values: Any, count: int) -> float:
+    """Sum of the ``count`` highest, by a heap of them whose lowest is on top."""
     count = min(count, len(values))
-    return float(np.partition(values, count - 1)[:count].sum()) if count > 0 else 0.0
+    heap = np.full(max(1, count), -np.inf)
+    for i in range(len(values) if count > 0 else 0):
+        value = values[i]
+        if value <= heap[0]:
+            continue
+        hole = 0
+        while 2 * hole + 1 < count:
+            child = 2 * hole + 1
+            if child + 1 < count and heap[child + 1] < heap[child]:
+                child += 1
+            if heap[child] >= value:
+                break
+            heap[hole] = heap[child]
+            hole = child
+        heap[hole] = value
+    total = 0.0
+    for place in range(count):
+        total += heap[place]
+    return total
