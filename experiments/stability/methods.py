@@ -133,22 +133,34 @@ def stamp(points: NDArray[np.float64], size: int) -> Cover:
     """Cover as ``stamps``, ``across-polygons`` and ``bit-mask`` do: whole numbers of 1/4096 pixel."""
     count = np.zeros((size, size), np.int64)
     polygons = np.zeros((len(points), 3, 3), np.float32)
-    polygons[..., :2] = points
-    polygons[..., 1] = size - polygons[..., 1]
+    polygons[..., :2] = _downward(points, size)
     _stamp_cover(polygons, *new_setup(), count)
     return Cover(count[::-1] > 0, int(count.sum()))
 
 
 def quads(points: NDArray[np.float64], size: int) -> Cover:
     """Cover as ``micropolygon`` does: four float32 edge functions of a quad, whose last corner is doubled here."""
+    vertices = np.zeros((len(points), 16, 2))
+    vertices[:] = points[:, 2:, :]
+    vertices[:, 0], vertices[:, 1] = points[:, 0], points[:, 1]
+    return _grid_cover(vertices, size)
+
+
+def quad_lattice(lattice: NDArray[np.float64], size: int) -> Cover:
+    """Cover the quads between points (R, C, 2) as ``micropolygon`` does, 3 x 3 a grid."""
+    rows, columns = (lattice.shape[k] // 3 for k in (0, 1))
+    grids = [lattice[3 * j : 3 * j + 4, 3 * i : 3 * i + 4] for j in range(rows) for i in range(columns)]
+    return _grid_cover(np.stack(grids).reshape(-1, 16, 2), size)
+
+
+def _grid_cover(corners: NDArray[np.float64], size: int) -> Cover:
+    """Draw grids (N, 16, 2), each listed in every tile."""
     tiles = screen_tiles(size, size, TILE, 4)
-    vertices = np.zeros((len(points), 16, 4), np.float32)
-    vertices[..., :2] = points[:, 2:, :]
-    vertices[:, 0, :2], vertices[:, 1, :2] = points[:, 0], points[:, 1]
-    vertices[..., 1] = size - vertices[..., 1]
-    count = np.full(tiles.total, len(points), np.uint32)
-    lists = np.tile(np.arange(len(points), dtype=np.uint32), tiles.total)
-    start = (np.arange(tiles.total) * len(points)).astype(np.uint32)
+    vertices = np.zeros((len(corners), 16, 4), np.float32)
+    vertices[..., :2] = _downward(corners, size)
+    count = np.full(tiles.total, len(corners), np.uint32)
+    lists = np.tile(np.arange(len(corners), dtype=np.uint32), tiles.total)
+    start = (np.arange(tiles.total) * len(corners)).astype(np.uint32)
     simt = load_machine(MACHINE).simt
     _, depth, overdraw, _ = tile_raster(vertices, count, start, lists, tiles, size, size, simt)
     assert overdraw is not None  # noqa: S101 - counting is on
@@ -157,8 +169,9 @@ def quads(points: NDArray[np.float64], size: int) -> Cover:
 
 def _screen(points: NDArray[np.float64], size: int) -> NDArray[np.float32]:
     """Corners as Ru's vertex shading leaves them: pixels right and down, depth, 1/w."""
-    flat = np.asarray(points, np.float64).reshape(-1, 2)
-    return np.stack([flat[:, 0], size - flat[:, 1], 0 * flat[:, 0], 1 + 0 * flat[:, 0]], axis=1).astype(np.float32)
+    screen = np.ones((points.size // 2, 4), np.float32)
+    screen[:, :2] = _downward(points, size).reshape(-1, 2)
+    return screen
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -188,11 +201,12 @@ def _stamp_cover(polygons: Any, edges: Any, boxes: Any, depths: Any, snapped: An
                 count[y, x] += covering_triangle(edges, x * STEP + STEP // 2, y * STEP + STEP // 2) >= 0
 
 
+QUADS = "micropolygon: float32 edges of a quad"
 METHODS: dict[str, Method] = {
     "cudaraster, freepipe: 1/16 pixel": by_pipeline("cudaraster", cull_backfaces=False, mode="color"),
     "hardware: 1/256 pixel": by_pipeline("hardware", cull_backfaces=False),
     "stamps: 1/4096 pixel": stamp,
     "tiled, per-primitive: float32 barycentrics": barycentrics,
     "binned: float32 edge planes": edge_planes,
-    "micropolygon: float32 edges of a quad": quads,
+    QUADS: quads,
 }
