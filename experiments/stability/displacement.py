@@ -30,7 +30,7 @@ WAVE = 6.0  # pixels from bump to bump
 BOUNDS = (2.0, 4.0, 8.0)  # pixels
 TILE = 8
 AMPLITUDES = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)  # pixels up and down
-SHOWN = (4.0, 8.0)  # bound and amplitude of the picture
+SHOWN = (4.0, 4.0)  # bound and amplitude of the picture
 FILL = 0.98 * 16 * 8.0  # pixels a side of the square: halved, a little less than each bound
 PLANE = flat_patch([[[x * FILL / WIDTH, y * FILL / HEIGHT, 0] for x in (-1, 1)] for y in (-1, 1)])
 VIEW = np.eye(4)  # clip space
@@ -89,8 +89,8 @@ def run(progress: Progress) -> Result:
         Figure("lost", lambda path: _plot(table, path)),
         Figure("picture", lambda path: wrong_pixels(frame(*SHOWN).image, wrong, path, title=title)),
     ]
-    title = "Displacement out of the four tiles of a sub-patch"
-    return atlas_result("stability/displacement", title, boundaries, figures, _notes(table), {"amplitudes": table})
+    heading = "Displacement out of the four tiles of a sub-patch"
+    return atlas_result("stability/displacement", heading, boundaries, figures, _notes(table), {"amplitudes": table})
 
 
 def _row(bound: float, amplitude: float) -> dict[str, float]:
