@@ -17,7 +17,7 @@ class Frame:
     Parameters
     ----------
     image : ndarray, (H, W, 3), uint8
-        Row 0 is the top row.
+        Row 0 is the top row. Without pixels where only numbers were asked for: ``numbers``.
     depth : ndarray, (H, W)
         In the pipeline's own format (float32, or the original's uint32).
     works : sequence of Work or FixedFunctionWork
@@ -36,3 +36,8 @@ class Frame:
     triangle_ids: NDArray[np.int32] | None = None
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def numbers(cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any] | None = None) -> "Frame":
+        """Make a frame of which only the numbers were asked for."""
+        return cls(np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32), works, facts=facts or {})

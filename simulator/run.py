@@ -1,20 +1,23 @@
-"""A run: the picture, what each stage did, and how long it would take."""
+"""A run: the picture, what each stage did, how long it would take, and how sure each number is."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from models.errors import TilestampError
 from models.fixed_function import PipeLaunch
 from models.launch import Launch
 from models.machine import Machine, load_machine
 from models.price import Fidelity, price
 from models.timing import Timing
+from simulator import intervals
 from simulator.frame import Frame
 from simulator.mix import load_mix
-from simulator.stage_table import stage_table
+from simulator.sampling import Estimate
+from simulator.stage_table import interval_table, stage_table
 from simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
@@ -34,16 +37,26 @@ class Run:
     options: dict[str, Any]
     frame: Frame
     note: str = ""
+    error: float = 0.0
+    sampled: dict[str, Any] = field(default_factory=dict)
+    """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
 
     @property
     def image(self) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) uint8, row 0 the top row."""
-        return self.frame.image
+        return self._drawn(self.frame.image)
 
     @property
     def depth(self) -> NDArray[Any]:
         """Depth, (H, W), in the pipeline's own format."""
-        return self.frame.depth
+        return self._drawn(self.frame.depth)
+
+    def _drawn(self, pixels: NDArray[Any]) -> NDArray[Any]:
+        if pixels.size:
+            return pixels
+        if self.sampled:
+            raise TilestampError("a sampled run draws no picture; ask with error=0")
+        raise TilestampError("only numbers were asked for; ask with picture=True")
 
     @property
     def triangle_ids(self) -> NDArray[np.int32] | None:
@@ -64,12 +77,13 @@ class Run:
     @cached_property
     def timings(self) -> list[Timing]:
         """Time of each launch, in launch order; empty terms at fidelity ``counts``."""
-        return price(self.launches, self.machine, self.fidelity)
+        return price(self.launches, self.machine, self.fidelity, self.error)
 
     @cached_property
     def stages(self) -> "pd.DataFrame":
         """One row a stage, in the order of the pipeline: counts, rates, cycles, milliseconds, bound."""
-        return stage_table(self.frame.works, self.launches, self.timings, self.machine.sm.warp_size)
+        table = stage_table(self.frame.works, self.launches, self.timings, self.machine.sm.warp_size)
+        return table.join(interval_table(self.intervals)) if self.sampled else table
 
     @cached_property
     def counts(self) -> dict[str, int]:
@@ -85,6 +99,52 @@ class Run:
     def milliseconds(self) -> float:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
+
+    @cached_property
+    def intervals(self) -> dict[tuple[str, str], Estimate]:
+        """Value, low and high of 95 % intervals by stage (``frame``: all) and number.
+
+        Numbers are ``milliseconds``, ``instructions``, ``sample_tests`` and ``sample_hits``; what was not sampled has
+        an interval of no width.
+        """
+        parts: dict[tuple[str, str], list[Estimate]] = {}
+        for work, launch, timing in zip(self.frame.works, self.launches, self.timings, strict=True):
+            for name, estimate in self._intervals(work, launch, timing).items():
+                parts.setdefault((work.stage, name), []).append(estimate)
+                parts.setdefault(("frame", name), []).append(estimate)
+        return {key: intervals.add(estimates) for key, estimates in parts.items()}
+
+    def _intervals(self, work: Any, launch: Any, timing: Timing) -> dict[str, Estimate]:
+        """Of one launch."""
+        counts = intervals.count_intervals(work)
+        known = {name.lower(): counts.get(name, intervals.exactly(0)) for name in ("SAMPLE_TESTS", "SAMPLE_HITS")}
+        if isinstance(work, Work):
+            ran = self._ran(work)
+            known["instructions"] = intervals.instructions(work, launch, ran)
+            known["milliseconds"] = intervals.milliseconds(timing, work, ran, self.machine)
+        else:
+            known["milliseconds"] = intervals.exactly(timing.milliseconds)
+        return known
+
+    def _ran(self, work: Work) -> Launch | None:
+        """Price the units that ran, where not all did."""
+        if work.sample is None:
+            return None
+        return self._launch(replace(work, table=work.sample.rows, streams=(), atomic_requests=None))
+
+    @cached_property
+    def counts_interval(self) -> dict[str, Estimate]:
+        """The 95 % interval of each of ``counts``."""
+        parts: dict[str, list[Estimate]] = {}
+        for work in self.frame.works:
+            for name, estimate in intervals.count_intervals(work).items():
+                parts.setdefault(f"{work.stage}.{name}", []).append(estimate)
+        return {key: intervals.add(estimates) for key, estimates in parts.items()}
+
+    @property
+    def milliseconds_interval(self) -> Estimate:
+        """The frame's time and its 95 % interval."""
+        return self.intervals["frame", "milliseconds"]
 
     def on(self, machine: Machine | str, fidelity: Fidelity | None = None) -> "Run":
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""

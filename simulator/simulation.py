@@ -6,8 +6,9 @@ from typing import Any
 from models.errors import TilestampError
 from models.machine import Machine, load_machine
 from models.price import FIDELITIES, Fidelity
-from simulator.pipelines import load_pipeline, pipeline_options
+from simulator.pipelines import load_pipeline, pipeline_options, takes
 from simulator.run import Run
+from simulator.sampler import Sampler
 from simulator.scenes import Scene, load_scene, read_camera
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
@@ -22,6 +23,9 @@ def simulate(
     height: int = 768,
     camera: Any = None,
     fidelity: Fidelity = "schedule",
+    error: float = 0.0,
+    seed: int = 0,
+    picture: bool = True,
     **options: Any,
 ) -> Run:
     """Draw ``scene`` by ``pipeline`` and price the work on ``machine``.
@@ -39,8 +43,17 @@ def simulate(
     camera : optional
         A view's name, a ``LookAt``, a 4x4 model-to-clip matrix (row-major, column vectors), or a JSON file; the
         scene's default view if not given.
-    fidelity : {"counts", "bounds", "schedule"}
-        How far to go: no time; a roofline for each launch; units of work scheduled on the machine.
+    fidelity : {"counts", "bounds", "auto", "schedule"}
+        How far to go: no time; a roofline for each launch; launch by launch the cheaper of its neighbours that is
+        within ``error`` of the latter (5 % if 0); units of work scheduled on the machine.
+    error : float
+        Relative error that will do, 0 to 1. Above 0 the expensive stages execute a random part of their units, no
+        picture is drawn, and each number carries its 95 % interval (``Run.intervals``); the part grows until the
+        half-width of each stage's time, instructions and sample tests and hits is under ``error`` of their value.
+    seed : int
+        Of the random part.
+    picture : bool
+        Whether one is wanted; without it what only makes the picture is skipped.
     **options
         The pipeline's own: ``tile``, ``spp``, ``bound``, ``msaa``, ``mode``...
 
@@ -56,10 +69,23 @@ def simulate(
     scene = load_scene(scene) if isinstance(scene, str) else scene
     machine = load_machine(machine) if isinstance(machine, str) else machine
     _check(pipeline, fidelity, width, height, options)
+    if not 0.0 <= error < 1.0:
+        raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, **options)
-    return Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note)
+    sampler = Sampler(error, seed, pipeline, machine) if error and takes(pipeline, "sample") else None
+    internal = ({"sample": sampler} if sampler else {}) | ({"picture": False} if _no_picture(pipeline, picture) else {})
+    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, **options, **internal)
+    note, sampled = scene.note, {}
+    if sampler and sampler.executed:
+        sampled = {"units": sampler.executed, "seconds_saved": sampler.seconds_saved}
+    elif error:
+        note = "; ".join(filter(None, [note, f"nothing was sampled: {pipeline} with these options runs in full"]))
+    return Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, note, error, sampled)
+
+
+def _no_picture(pipeline: str, picture: bool) -> bool:
+    return not picture and takes(pipeline, "picture")
 
 
 def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
 """The table of stages: launches gathered by stage, in the order of the pipeline."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from models.events import INSTRUCTION_CLASSES, MachineEvent
 from models.fixed_function import PipeLaunch
 from models.launch import Launch
 from models.timing import Timing
+from simulator.sampling import Estimate
 from simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
@@ -71,7 +72,21 @@ def _row(parts: list[tuple[Any, Any, Timing]], warp: int) -> dict[str, Any]:
         "cycles": sum(timing.cycles for _, _, timing in parts),
         "milliseconds": sum(timing.milliseconds for _, _, timing in parts),
         "bound": longest.bound,
+        **_chosen([timing for _, _, timing in parts]),
         **_terms([timing for _, _, timing in parts]),
+    }
+
+
+def _chosen(timings: list[Timing]) -> dict[str, str]:
+    """What ``auto`` chose and why: of the launches that were escalated, the longest one's reason."""
+    if not any(timing.why for timing in timings):
+        return {}
+    played = [timing for timing in timings if timing.fidelity == "schedule"]
+    told = max(played or timings, key=lambda timing: timing.milliseconds)
+    some = 0 < len(played) < len(timings)
+    return {
+        "fidelity": f"{len(played)} of {len(timings)} schedule" if some else told.fidelity,
+        "why": f"{told.kernel}: {told.why}" if some else told.why,
     }
 
 
@@ -82,3 +97,14 @@ def _terms(timings: list[Timing]) -> dict[str, float]:
         for name, milliseconds in timing.terms.items():
             terms[f"{name}_ms"] = terms.get(f"{name}_ms", 0.0) + milliseconds
     return terms
+
+
+def interval_table(intervals: Mapping[tuple[str, str], Estimate]) -> "pd.DataFrame":
+    """Ends of the intervals of each stage, a column each (``milliseconds_low``, ``milliseconds_high``...)."""
+    import pandas as pd
+
+    rows: dict[str, dict[str, float]] = {}
+    for (stage, name), estimate in intervals.items():
+        if stage != "frame":
+            rows.setdefault(stage, {}).update({f"{name}_low": estimate.low, f"{name}_high": estimate.high})
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("stage")

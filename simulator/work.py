@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from models.fixed_function import PipeLaunch
 from models.launch import Stream
+from simulator.sampling import Sample
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Work:
         Global atomic requests by 32-byte chunk of the target buffer.
     variant : str
         How the kernel was compiled, where that changes its code (``"tile 8 spp 4"``): a mix may price it by itself.
+    sample : Sample or None
+        The units that ran, where not all did: the rows of the others are estimates.
     """
 
     stage: str
@@ -50,6 +53,7 @@ class Work:
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
     variant: str = ""
+    sample: Sample | None = field(default=None, repr=False)
 
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""

@@ -41,6 +41,8 @@ def render(
     size: str = "1024x768",
     camera: str | None = None,
     fidelity: Literal["counts", "bounds", "auto", "schedule"] = "schedule",
+    error: float = 0.0,
+    seed: int = 0,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[MapName | None, Parameter(name="--map")] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
@@ -72,6 +74,11 @@ def render(
     fidelity
         counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine; auto:
         launch by launch bounds where it is proved to be near enough to schedule, which is the rest.
+    error
+        Relative error that will do, as 0.01: expensive stages execute a random part of their blocks, every number gets
+        its 95 % interval, and there is no picture.
+    seed
+        Of the random part.
     output
         PNG file for the picture.
     map_
@@ -102,12 +109,15 @@ def render(
     """
     width, height = parse_size(size)
     _check_output(output, map_)
+    if error and output is not None:
+        raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
     named = {"tile": tile, "spp": spp, "bound": bound, "msaa": msaa, "mode": mode, "release": release}
     named |= {"hybrid": hybrid, "cull_backfaces": cull_backfaces}
     options = {key: value for key, value in named.items() if value is not None}
     options |= dict(parse_assignment(text) for text in option)
     with progress(f"drawing {scene}") as say:
-        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, fidelity, options)
+        asked = {"fidelity": fidelity, "error": error, "seed": seed, "picture": output is not None}
+        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked | options)
         say("pricing")
         stages = run.stages
     if map_ is not None and output is not None:
@@ -127,8 +137,7 @@ def _simulate(
     changes: tuple[str, ...],
     size: tuple[int, int],
     camera: str | None,
-    fidelity: Any,
-    options: dict[str, Any],
+    asked: dict[str, Any],
 ) -> Run:
     """Load the machine with its what-ifs and simulate."""
     from models.machine import altered, load_machine
@@ -137,9 +146,7 @@ def _simulate(
     described = load_machine(machine)
     if changes:
         described = altered(described, dict(map(parse_assignment, changes)), "assumed", "a what-if on the command line")
-    return simulate(
-        scene, pipeline, described, width=size[0], height=size[1], camera=camera, fidelity=fidelity, **options
-    )
+    return simulate(scene, pipeline, described, width=size[0], height=size[1], camera=camera, **asked)
 
 
 def parse_size(size: str) -> tuple[int, int]:
@@ -216,9 +223,21 @@ def as_json(run: Run) -> dict[str, Any]:
         "fidelity": run.fidelity,
         "options": run.options,
         "milliseconds": run.milliseconds,
+        **_sampling(run),
         "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
         "counts": run.counts,
         "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
+    }
+
+
+def _sampling(run: Run) -> dict[str, Any]:
+    """What was sampled, and the intervals; nothing for a run that executed everything."""
+    if not run.sampled:
+        return {}
+    return {
+        "error": run.error,
+        "sampled": _plain(run.sampled),
+        "intervals": {f"{stage}.{name}": list(estimate) for (stage, name), estimate in run.intervals.items()},
     }
 
 
@@ -239,7 +258,27 @@ def _print_stages(run: Run, stages: Any, output: Path | None) -> None:
         [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
         for stage, row in stages[list(columns)].to_dict(orient="index").items()
     ]
-    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {run.milliseconds:.2f} ms"
+    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {_shown_time(run)}"
     print_table(title, ["stage", *columns], rows)
-    for line in filter(None, [run.note, f"picture: {output}" if output else ""]):
+    for line in filter(None, [run.note, _shown_sample(run), f"picture: {output}" if output else ""]):
         sys.stdout.write(line + "\n")
+
+
+def _shown_time(run: Run) -> str:
+    """Show the frame's milliseconds, with their interval where the run was sampled."""
+    if not run.sampled:
+        return f"{run.milliseconds:.2f} ms"
+    return f"{run.milliseconds:.2f} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
+
+
+def _shown_sample(run: Run) -> str:
+    """Say which part was executed, and how sure the main numbers are."""
+    if not run.sampled:
+        return ""
+    parts = ", ".join(f"{ran} of {units} units of {kernel}" for kernel, (ran, units) in run.sampled["units"].items())
+    wide = ", ".join(
+        f"{name.replace('_', ' ')} {100 * estimate.relative:.2g} %"
+        for (stage, name), estimate in run.intervals.items()
+        if stage == "frame"
+    )
+    return f"executed: {parts}\n95 % intervals of the frame, half-width: {wide}"

@@ -6,6 +6,7 @@ names are a unit cube and one triangle. Models that are not on the scene path ar
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -60,16 +61,14 @@ def camera(scene: Scene) -> Camera:
     return CAMERA
 
 
-def draw(name: str, pipeline: str, fidelity: Fidelity = "schedule", **options: object) -> Run | None:
+def draw(name: str, pipeline: str, fidelity: Fidelity = "schedule", **options: Any) -> Run | None:
     """Draw one model as he did; None where it is not on the scene path."""
     try:
         scene = model(name)
     except TilestampError:
         return None
     view = camera(scene)
-    return simulate(  # type: ignore[arg-type]
-        scene, pipeline, MACHINE, width=SIZE, height=SIZE, camera=view, fidelity=fidelity, **options
-    )
+    return simulate(scene, pipeline, MACHINE, width=SIZE, height=SIZE, camera=view, fidelity=fidelity, **options)
 
 
 def missing(names: list[str]) -> list[str]:

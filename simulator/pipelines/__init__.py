@@ -2,6 +2,9 @@
 
 A pipeline is a function that bears its module's name:
 ``pipeline(scene, matrix, width, height, simt, *, options...) -> Frame``.
+
+Two keywords are no options: ``sample``, a ``Sampler`` by which expensive stages run on part of their units, and
+``picture``, which says whether one is wanted. ``simulate`` hands them to the pipelines that have them.
 """
 
 import inspect
@@ -13,6 +16,7 @@ from models.errors import TilestampError
 from simulator.frame import Frame
 
 Pipeline = Callable[..., Frame]
+INTERNAL = ("sample", "picture")  # keywords that a pipeline may have for simulate
 
 
 def pipeline_names() -> list[str]:
@@ -36,6 +40,15 @@ def load_pipeline(name: str) -> Pipeline:
 
 
 def pipeline_options(name: str) -> dict[str, inspect.Parameter]:
-    """Options of the pipeline ``name``: its keyword-only parameters."""
+    """Options of the pipeline ``name``: its keyword-only parameters, less what ``simulate`` itself hands over."""
+    return {key: p for key, p in _keywords(name).items() if key not in INTERNAL}
+
+
+def takes(name: str, keyword: str) -> bool:
+    """Whether the pipeline ``name`` can be handed ``sample`` (run part of the units) or ``picture`` (draw none)."""
+    return keyword in _keywords(name)
+
+
+def _keywords(name: str) -> dict[str, inspect.Parameter]:
     parameters = inspect.signature(load_pipeline(name)).parameters
     return {key: p for key, p in parameters.items() if p.kind is p.KEYWORD_ONLY}

@@ -15,6 +15,8 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines._cudaraster_facts import Counters, add_counters, fine_counters, frame_facts, setup_counters
 from simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
+from simulator.pipelines._cudaraster_sampled import sampled_draw
+from simulator.sampler import Sampler
 from simulator.scenes.scene import Scene
 from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
@@ -57,6 +59,7 @@ def cudaraster(
     cull_backfaces: bool | None = None,
     batches: int = 1,
     counting: bool = True,
+    sample: Sampler | None = None,
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
@@ -81,6 +84,8 @@ def cudaraster(
     batches : int
         Draws that the triangles are divided among; the first clears.
     counting : bool
+    sample : Sampler, optional
+        Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
 
     Returns
     -------
@@ -97,17 +102,19 @@ def cudaraster(
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
+    if sample is not None and batches == 1:
+        return Frame.numbers(sampled_draw(sample, positions, mesh.triangles, width, height, simt, options))
     colors = None if mode == "depth-only" else vertex_colors(mesh, matrix)
     state = _State(options, (width, height), simt, counting, colors)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
         _draw(state, positions, mesh.triangles[first:last], first)
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
-    sample = shown_sample(msaa)
-    ids = state.buffers.ids[sample, :height, :width][::-1]
+    shown = shown_sample(msaa)
+    ids = state.buffers.ids[shown, :height, :width][::-1]
     image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
     facts = frame_facts(state.counters, state.needed, release, state.retries)
     return Frame(
-        image, state.buffers.depth[sample, :height, :width][::-1], state.works, ids, maps=state.maps, facts=facts
+        image, state.buffers.depth[shown, :height, :width][::-1], state.works, ids, maps=state.maps, facts=facts
     )
 
 

@@ -5,6 +5,7 @@ screen tiles by count, scan and write; rasterize each tile. In the hybrid the gr
 instead of the buckets.
 """
 
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from models.errors import TilestampError
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines._micropolygon_hybrid import draw_grids
+from simulator.sampler import Sampler
 from simulator.scenes.scene import Scene
 from simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
 from simulator.stages.eisenacher2010.bucket_count import bucket_count
@@ -21,8 +23,8 @@ from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from simulator.stages.eisenacher2010.bucket_write import bucket_write
 from simulator.stages.eisenacher2010.dice import dice
 from simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from simulator.stages.eisenacher2010.tile_raster import raster_streams, tile_raster
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from simulator.work import Work
 
 
@@ -42,6 +44,7 @@ def micropolygon(
     hybrid: bool = False,
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
+    sample: Sampler | None = None,
 ) -> Frame:
     """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 
@@ -72,6 +75,8 @@ def micropolygon(
         Laid over each patch.
     counting : bool
         Count what the machine does.
+    sample : Sampler, optional
+        Run part of the units; no picture comes back.
 
     Returns
     -------
@@ -98,7 +103,8 @@ def micropolygon(
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
     start, scanned = bucket_scan(count, simt, counting=counting)
     lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
-    image, depth, overdraw, drawn = tile_raster(
+    raster = partial(
+        tile_raster,
         grids.vertices,
         count,
         start,
@@ -112,6 +118,16 @@ def micropolygon(
         edges=edges,
         counting=counting,
     )
+    if sample is not None:
+        shape = block_shape(tile, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+        sampled = sample.stage(
+            count,
+            lambda blocks: raster(only=blocks)[3][0],
+            lambda table: raster_streams(table, lists, shape, simt, len(grids.vertices)),
+        )
+        works = [*split, *diced, *counted, *scanned, *written, sampled]
+        return Frame.numbers(works, _facts(subpatches, len(lists)))
+    image, depth, overdraw, drawn = raster()
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
     return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, len(lists)))

@@ -46,6 +46,7 @@ from simulator.stages.eisenacher2010.tile_raster_samples import (
 from simulator.work import Work
 
 SAMPLES_A_PIXEL = (1, 4, 16)
+_PART_TILES = 32  # tiles that one call of the worker takes, at least
 SMALLEST_WARP = 16  # lanes: 16 load a grid together
 
 _E = TileRasterEvent
@@ -82,31 +83,31 @@ def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
 
 
 @njit(cache=True, nogil=True)
-def _raster_rows(
-    part, parts, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
+def _raster_tiles(
+    part, parts, drawn, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
 ):
-    """Every ``parts``-th row of tiles."""
+    """One part of the tiles ``drawn``; row i of the table is that of the i-th of them."""
     size = shape.tile * shape.side
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
     addresses = np.empty(shape.warp, np.int64)
     height, width = depth.shape
-    for tile_row in range(part, tiles.rows, parts):
-        for column in range(tiles.columns):
-            block = tile_row * tiles.columns + column
-            first, grids = np.int64(start[block]), np.int64(count[block])
-            row = None if table is None else table[block]
-            origin = (np.float64(column * shape.tile), np.float64(tile_row * shape.tile))
-            samples.depth[:] = FAR
-            samples.color[:] = BACKGROUND
-            samples.hits[:] = 0
-            for k in range(first, first + grids):
-                _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
-            resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
-            if row is not None:
-                count_block(block, lists, first, grids, shape, traffic, row)
-                count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
+    for i in range(drawn.size * part // parts, drawn.size * (part + 1) // parts):
+        block = drawn[i]
+        tile_row, column = block // tiles.columns, block % tiles.columns
+        first, grids = np.int64(start[block]), np.int64(count[block])
+        row = None if table is None else table[i]
+        origin = (np.float64(column * shape.tile), np.float64(tile_row * shape.tile))
+        samples.depth[:] = FAR
+        samples.color[:] = BACKGROUND
+        samples.hits[:] = 0
+        for k in range(first, first + grids):
+            _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
+        resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
+        if row is not None:
+            count_block(block, lists, first, grids, shape, traffic, row)
+            count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
 
 
 def tile_raster(
@@ -123,6 +124,7 @@ def tile_raster(
     box_tests: bool = True,
     edges: Literal["computed", "loaded"] = "computed",
     counting: bool = True,
+    only: NDArray[np.int64] | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32] | None, list[Work]]:
     """Draw the grids of each tile.
 
@@ -146,6 +148,8 @@ def tile_raster(
         Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture.
     counting : bool
         Without it no events are counted and no works come back.
+    only : ndarray, int64, optional
+        Tiles to draw, where not all; the pixels of the others mean nothing.
 
     Returns
     -------
@@ -155,7 +159,7 @@ def tile_raster(
     overdraw : ndarray, (H, W), int32, or None
         Quads that cover a sample, summed over the samples of each pixel.
     works : list of Work
-        One, a row a tile.
+        One, a row a tile drawn.
 
     Raises
     ------
@@ -172,14 +176,14 @@ def tile_raster(
     image = np.empty((height, width, 3), np.uint8)
     depth = np.empty((height, width), np.float32)
     overdraw = np.empty((height, width), np.int32) if counting else None
-    table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
+    blocks = np.arange(tiles.total) if only is None else only
+    table = np.zeros((len(blocks), len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
     colors = vertices.view(np.uint32)[:, :, 3]
     buffers = (image, depth, overdraw, table)
-    for_parts(
-        _raster_rows, parts_of(tiles.rows), vertices, colors, count, start, lists, tiles, shape, traffic, *buffers
-    )
-    works = [] if table is None else [_work(shape, table, lists, len(vertices), traffic.grid_bytes)]
+    parts = parts_of(len(blocks), _PART_TILES)
+    for_parts(_raster_tiles, parts, blocks, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
+    works = [] if table is None else [_work(shape, table, raster_streams(table, lists, shape, simt, len(vertices)))]
     return image, depth, overdraw, works
 
 
@@ -191,13 +195,15 @@ def shared_bytes(shape: BlockShape) -> int:
     return grids * (VERTICES + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
 
 
-def _work(shape: BlockShape, table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, grid_bytes: int) -> Work:
-    """Work of the kernel, with the buffers that it touches."""
+def raster_streams(
+    table: NDArray[np.int64], lists: NDArray[np.uint32], shape: BlockShape, simt: Simt, grids: int
+) -> tuple[Stream, ...]:
+    """Buffers that the kernel touches, by the rows of all tiles, their lists, and the number of grids."""
     total = table.sum(axis=0)
     seen = np.zeros(grids, np.bool_)
     seen[lists] = True
     drawn = int(np.count_nonzero(seen))
-    vertex_bytes = int(total[_E.GRIDS]) * grid_bytes
+    vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
     edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
     streams = [
@@ -207,6 +213,11 @@ def _work(shape: BlockShape, table: NDArray[np.int64], lists: NDArray[np.uint32]
     ]
     if shape.loaded:
         streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
+    return tuple(streams)
+
+
+def _work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...]) -> Work:
+    """Work of the kernel."""
     return Work(
         "tile_raster",
         "tile_raster",
@@ -215,6 +226,6 @@ def _work(shape: BlockShape, table: NDArray[np.int64], lists: NDArray[np.uint32]
         len(table),
         shape.tile**2,
         shared_bytes(shape),
-        streams=tuple(streams),
+        streams=streams,
         variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )

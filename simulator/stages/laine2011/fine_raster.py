@@ -263,16 +263,27 @@ def fine_raster(
             active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers,
             True if samples > 1 else None, table if counting else None,
         )  # fmt: skip
+    if counting:
+        _count_starts(table, WARPS * simt.sms)
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
-    streams = _streams(table, setup, tile_entries, buffers, draw)
+    streams = fine_streams(table, setup, len(tile_entries), width, height, samples)
     work = Work(
         "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams
     )
     return buffers, work
 
 
-def _streams(
-    table: NDArray[np.int64], setup: Setup, entries: NDArray[np.int32], buffers: FrameBuffers, draw: Draw
+def _count_starts(table: NDArray[np.int64], warps: int) -> None:
+    """Add what a warp does besides its tiles to the first that it draws: it starts, and its last draw finds no tile."""
+    E = FineRasterEvent
+    if len(table):
+        rows = np.bincount(np.arange(warps) % len(table), minlength=len(table))
+        for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
+            table[:, event] += rows
+
+
+def fine_streams(
+    table: NDArray[np.int64], setup: Setup, entries: int, width: int, height: int, samples: int
 ) -> tuple[Stream, ...]:
     """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
 
@@ -284,12 +295,12 @@ def _streams(
     lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
     headers = int(total[E.ENTRY_LANES]) * HEADER_BYTES
     kept = int(setup.subtriangles.sum(dtype=np.int64))
-    pixels = 2 * buffers.depth.nbytes
-    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS << draw.log_samples
+    pixels = 2 * 4 * PIXELS * samples * (-(-width // TILE) * -(-height // TILE))
+    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS * samples
     rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
     records = kept * setup.planes.shape[1] * 4
     return (
-        Stream("tile_queues", "load", lists, entries.nbytes),
+        Stream("tile_queues", "load", lists, 4 * entries),
         Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES),
         Stream("triangle_data", "load", min(rest, records), records),
         Stream("pixels", "load", tiles, pixels if tiles else 0),

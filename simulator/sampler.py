@@ -1,0 +1,112 @@
+"""The sampler of a run: it has a stage execute part of its units, and more of them until the answer is close enough."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.demand import demand
+from models.events import INSTRUCTION_CLASSES
+from models.launch import Stream
+from models.machine import Machine
+from models.traffic import Traffic
+from simulator.mix import load_mix
+from simulator.sampling import Floats, Integers, Sample, drawn, enlarged, expanded, make_strata, pilot, totals
+from simulator.work import Work
+
+ROUNDS = 6  # enlargements at most; then everything runs
+MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
+
+
+@dataclass
+class Sampler:
+    """What a run asks of its samples, and what they did.
+
+    Parameters
+    ----------
+    error : float
+        Largest half-width of a stage's time, instructions, sample tests and hits, over their value.
+    seed : int
+    pipeline : str
+        Whose mix says what an instruction is.
+    machine : Machine
+    """
+
+    error: float
+    seed: int
+    pipeline: str
+    machine: Machine
+    executed: dict[str, tuple[int, int]] = field(default_factory=dict)  # units run, and all, by kernel
+    seconds_saved: float = 0.0  # CPU seconds of the stages sampled, had all units cost alike by size
+
+    def stage(
+        self,
+        size: NDArray[Any],
+        execute: Callable[[Integers], Work],
+        streams: Callable[[Integers], tuple[Stream, ...]],
+    ) -> Work:
+        """Run a stage on a part of its units.
+
+        Parameters
+        ----------
+        size : ndarray, (units,)
+            What is known of each unit: the work that it will be, up to a factor.
+        execute : callable
+            Runs the units of the given indices; its ``Work`` has a row for each.
+        streams : callable
+            The buffers touched, by the rows of all units.
+
+        Returns
+        -------
+        Work
+            With a row for every unit, and the ``sample``.
+        """
+        strata = make_strata(size, [self.seed, len(self.executed)])
+        taken = pilot(strata)
+        begin = time.process_time()
+        work = execute(drawn(strata, taken))
+        sample = Sample(strata, taken, work.table)
+        for left in reversed(range(ROUNDS)):
+            if self.precise(sample, work):
+                break
+            more = enlarged(sample, self.measures(work, sample.rows), self.error) if left else strata.units
+            sample = _grown(sample, more, execute)
+        spent = time.process_time() - begin
+        ran, all_sizes = strata.size[drawn(strata, sample.taken)].sum(), strata.size.sum()
+        self.seconds_saved += spent * (all_sizes / ran - 1) if ran else 0.0
+        self.executed[work.kernel] = (int(sample.taken.sum()), len(strata.order))
+        table = expanded(sample)
+        grid = len(table) if work.dispatch == "blocks" else work.grid
+        return replace(work, table=table, grid=grid, streams=streams(table), sample=sample)
+
+    def precise(self, sample: Sample, work: Work) -> bool:
+        """Whether all that the run asks for is known within the error."""
+        found = totals(sample, self.measures(work, sample.rows))
+        return bool((found.half_width <= self.error * np.abs(found.value)).all())
+
+    def measures(self, work: Work, rows: Integers) -> Floats:
+        """What the answer is made of, of each unit: instructions, cycles, main counts; (units, quantities)."""
+        launch = load_mix(self.pipeline, self.machine.compute_capability).launch(
+            replace(work, table=rows, streams=()), self.machine.sm.warp_size
+        )
+        asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
+        counts = [rows[:, work.events[name]] for name in MAIN_COUNTS if name in work.events.__members__]
+        instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
+        return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)
+
+
+def _grown(sample: Sample, taken: Integers, execute: Callable[[Integers], Work]) -> Sample:
+    """Execute what ``taken`` has more than the sample."""
+    strata = sample.strata
+    old, new = drawn(strata, sample.taken), drawn(strata, taken)
+    place = np.full(len(strata.order), -1, np.int64)
+    place[old] = np.arange(len(old))
+    fresh = new[place[new] < 0]
+    rows = np.empty((len(new), sample.rows.shape[1]), np.int64)
+    rows[place[new] >= 0] = sample.rows[place[new][place[new] >= 0]]
+    if len(fresh):
+        rows[place[new] < 0] = execute(fresh).table
+    return Sample(strata, taken, rows)

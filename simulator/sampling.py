@@ -1,0 +1,283 @@
+"""Sampling: totals of a population of units of work from a stratified random part of it, with their intervals.
+
+Before a stage runs, something cheap is known about each of its units: the length of a tile's list, the visible
+triangles of a block. Units are cut into strata of nearly equal size by it. The largest units are a certainty stratum:
+they always run, so that the schedule sees the worst imbalance as it is. In every other stratum a random part runs; a
+total is then estimated by the ratio of what those units did to their size (Cochran 1977, Sampling Techniques, chapters
+5 and 6), with the finite-population correction: when all have run, the interval has no width.
+
+Everything here is a pure function of sizes, rows and a seed.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+CERTAIN = 24  # largest units, always executed
+STEP = 1.3  # largest ratio of sizes in a stratum
+FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
+PILOT = 96  # units that the first sample draws in proportion to size, and ...
+PILOT_EACH = 5  # ... at least from each stratum
+GENEROUS = 1.15  # of the units that the error seems to ask for: a spread is itself an estimate
+_QUANTILES = np.array([12.706, 4.303, 3.182, 2.776])  # of t at 97.5 %, for 1 to 4 degrees of freedom
+_Z = 1.959964
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Estimate(NamedTuple):
+    """A number and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """Half the interval's width."""
+        return (self.high - self.low) / 2
+
+    @property
+    def relative(self) -> float:
+        """Half-width over value; 0 where both are 0."""
+        return self.half_width / abs(self.value) if self.half_width else 0.0
+
+
+class Totals(NamedTuple):
+    """Estimated totals of several quantities: value, variance and degrees of freedom, (k,) each."""
+
+    value: Floats
+    variance: Floats
+    freedom: Floats
+
+    @property
+    def half_width(self) -> Floats:
+        """Of the 95 % intervals."""
+        return t_quantile(self.freedom) * np.sqrt(self.variance)
+
+
+@dataclass(frozen=True)
+class Strata:
+    """Units by stratum; stratum 0 is the certainty stratum.
+
+    Parameters
+    ----------
+    size : ndarray, (units,), float64
+        What is known of each unit.
+    order : ndarray, (units,), int64
+        Units, stratum after stratum, in random order inside each: a sample is a prefix of each stratum.
+    first : ndarray, (strata + 1,), int64
+        Where each stratum starts in ``order``.
+    """
+
+    size: Floats
+    order: Integers
+    first: Integers
+
+    @property
+    def units(self) -> Integers:
+        """Units of each stratum."""
+        return np.diff(self.first)
+
+    @property
+    def scale(self) -> Floats:
+        """Regressor of each unit in ``order``: its size, or 1 in a stratum of units without any."""
+        size = self.size[self.order]
+        empty = np.repeat(self._sums(size) == 0, self.units)
+        return np.where(empty, 1.0, size)
+
+    def _sums(self, values: Floats) -> Floats:
+        return np.array([part.sum() for part in np.split(values, self.first[1:-1])])
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Units that ran, and what they did.
+
+    Parameters
+    ----------
+    strata : Strata
+    taken : ndarray, (strata,), int64
+        Units that ran of each stratum.
+    rows : ndarray, (sum of taken, events)
+        Of the units ``drawn(strata, taken)``.
+    """
+
+    strata: Strata
+    taken: Integers
+    rows: Integers
+
+
+def t_quantile(freedom: Floats) -> Floats:
+    """Quantile of Student's t at 97.5 % (Cornish-Fisher, Abramowitz & Stegun 26.7.5; tabulated below 5)."""
+    nu = np.maximum(np.asarray(freedom, np.float64), 1.0)
+    z = _Z
+    series = (
+        z
+        + (z**3 + z) / (4 * nu)
+        + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * nu**2)
+        + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * nu**3)
+    )
+    small = np.interp(nu, [1.0, 2.0, 3.0, 4.0], _QUANTILES)
+    return np.where(nu <= len(_QUANTILES), small, series)
+
+
+def make_strata(size: NDArray[np.generic], seed: list[int]) -> Strata:
+    """Cut units into strata by size, and shuffle each.
+
+    Parameters
+    ----------
+    size : ndarray, (units,)
+        Not negative.
+    seed : list of int
+    """
+    known = size.astype(np.float64)
+    ascending = np.argsort(known, kind="stable")
+    split = max(0, len(known) - CERTAIN)
+    rest, certain = ascending[:split], ascending[split:]
+    cuts = _cuts(known[rest])
+    random = np.random.default_rng(seed)
+    parts = [certain, *(random.permutation(part) for part in np.split(rest, cuts) if len(part))]
+    first = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+    return Strata(known, np.concatenate(parts).astype(np.int64), first.astype(np.int64))
+
+
+def _cuts(size: Floats) -> Integers:
+    """Places where ascending sizes are cut: after the empty ones, then by ratio, no stratum below ``FEWEST``."""
+    empty = int(np.searchsorted(size, 0.0, side="right"))
+    if empty == len(size):
+        return np.zeros(0, np.int64)
+    level = np.floor(np.log(size[empty:] / size[empty]) / np.log(STEP) + 1e-9)
+    cuts = [empty] if empty else []
+    for cut in empty + np.flatnonzero(np.diff(level)) + 1:
+        if cut - (cuts[-1] if cuts else 0) >= FEWEST and len(size) - cut >= FEWEST:
+            cuts.append(int(cut))
+    return np.array(cuts, np.int64)
+
+
+def pilot(strata: Strata) -> Integers:
+    """Units that the first sample takes of each stratum."""
+    total = strata._sums(strata.size[strata.order])  # noqa: SLF001 - the same module
+    share = total / max(total[1:].sum(), 1e-300)
+    taken = np.minimum(strata.units, np.maximum(PILOT_EACH, np.ceil(PILOT * share))).astype(np.int64)
+    taken[0] = strata.units[0]
+    return taken
+
+
+def drawn(strata: Strata, taken: Integers) -> Integers:
+    """Units of a sample, stratum after stratum."""
+    units: Integers = strata.order[_places(strata, taken)]
+    return units
+
+
+def _places(strata: Strata, taken: Integers) -> Integers:
+    """Places in ``order`` of a sample."""
+    return np.repeat(strata.first[:-1] - np.cumsum(taken) + taken, taken) + np.arange(taken.sum())
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Ratios, residual spreads and what they add to the variance, by stratum: (strata, k) each."""
+
+    ratio: Floats
+    spread: Floats  # residual variance of a unit
+    weight: Floats  # (strata,) variance of a total by unit variance: N^2 (1 - n / N) / n
+    taken: Integers
+
+
+def _fit(sample: Sample, values: Floats) -> _Fit:
+    strata, taken = sample.strata, sample.taken
+    scale = strata.scale
+    x = scale[_places(strata, taken)]
+    starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
+    some = np.maximum(taken, 1)
+    sums = _reduce(x, starts, taken)
+    mean_all = strata._sums(scale) / np.maximum(strata.units, 1)  # noqa: SLF001 - the same module
+    ratio = _reduce(values, starts, taken) / np.where(sums > 0, sums, 1.0)[:, None]
+    residual = values - np.repeat(ratio, taken, axis=0) * x[:, None]
+    squares = _reduce(residual**2, starts, taken)
+    lift = np.where(sums > 0, mean_all * some / np.where(sums > 0, sums, 1.0), 1.0)
+    spread = squares / np.maximum(taken - 1, 1)[:, None] * (lift**2)[:, None]
+    weight = strata.units * (strata.units - taken) / some
+    return _Fit(ratio, spread, weight, taken)
+
+
+def _reduce(values: Floats, starts: Integers, taken: Integers) -> Floats:
+    """Sums by stratum; 0 for one of which none was taken."""
+    sums = np.zeros((len(taken), *values.shape[1:]))
+    some = taken > 0
+    if some.any():
+        sums[some] = np.add.reduceat(values, starts[some], axis=0)
+    return sums
+
+
+def totals(sample: Sample, values: Floats) -> Totals:
+    """Estimate the population's totals.
+
+    Parameters
+    ----------
+    sample : Sample
+    values : ndarray, (units that ran, k), float64
+        Of each unit that ran, in the order of ``sample.rows``.
+    """
+    fit = _fit(sample, values)
+    value = (fit.ratio * sample.strata._sums(sample.strata.scale)[:, None]).sum(axis=0)  # noqa: SLF001
+    part = fit.weight[:, None] * fit.spread
+    variance = part.sum(axis=0)
+    below = (part**2 / np.maximum(fit.taken - 1, 1)[:, None]).sum(axis=0)
+    freedom = np.where(below > 0, variance**2 / np.where(below > 0, below, 1.0), np.inf)
+    return Totals(value, variance, freedom)
+
+
+def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
+    """Units of each stratum that a relative error asks for, as the sample so far makes believe; all if none fewer do.
+
+    Every column of ``values`` is asked to reach the error. Units are spread by Neyman's rule: where there are many, and
+    where they differ.
+    """
+    fit, found = _fit(sample, values), totals(sample, values)
+    N, n = sample.strata.units, sample.taken
+    relative = np.where(found.value != 0, 1 / np.where(found.value != 0, found.value, 1.0), 0.0)
+    unlike = np.sqrt(_smoothed(sample, fit) * relative**2)  # by stratum and quantity
+    wish = N * unlike.max(axis=1)
+    goal = (error / t_quantile(found.freedom)) ** 2
+    low, high = 0.0, float((N[wish > 0] / wish[wish > 0]).max(initial=0.0))
+    for _ in range(60):  # the smallest sample by bisection of its scale
+        middle = (low + high) / 2
+        m = np.clip(np.ceil(middle * wish), n, N)
+        enough = ((N * (N - m) / np.maximum(m, 1))[:, None] * unlike**2).sum(axis=0) <= goal
+        low, high = (low, middle) if enough.all() else (middle, high)
+    more = np.clip(np.ceil(GENEROUS * high * wish), n, N)
+    return np.where(more > 0.8 * N, N, more).astype(np.int64)
+
+
+def _smoothed(sample: Sample, fit: _Fit) -> Floats:
+    """Residual variances, those of small samples drawn towards what is usual for the size of their stratum."""
+    strata = sample.strata
+    mean = strata._sums(strata.scale) / np.maximum(strata.units, 1)  # noqa: SLF001 - the same module
+    freedom = np.where(sample.taken < strata.units, np.maximum(sample.taken - 1, 0), 0)[:, None]
+    scaled = fit.spread / np.maximum(mean**2, 1e-300)[:, None]
+    usual = (freedom * scaled).sum(axis=0) / max(freedom.sum(), 1)
+    prior = 4.0
+    smoothed: Floats = (freedom * scaled + prior * usual) / (freedom + prior) * (mean**2)[:, None]
+    return smoothed
+
+
+def expanded(sample: Sample) -> Integers:
+    """Rows of all units, (units, events): as executed, and by the ratios of their stratum where they were not.
+
+    Rounded so that totals are the estimates; the rows of the certainty stratum are exact.
+    """
+    strata, taken = sample.strata, sample.taken
+    ran = np.zeros(len(strata.order), np.bool_)
+    ran[_places(strata, taken)] = True
+    table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
+    table[drawn(strata, taken)] = sample.rows
+    stratum = np.repeat(np.arange(len(taken)), strata.units)[~ran]
+    rows = _fit(sample, sample.rows.astype(np.float64)).ratio[stratum] * strata.scale[~ran][:, None]
+    ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
+    table[strata.order[~ran]] = np.diff(ends, axis=0, prepend=0)
+    return table
