@@ -14,6 +14,7 @@ from models.compile_cache import source_digest
 from reports.page import write_page
 
 PACKAGES = ("numpy", "numba", "pandas", "matplotlib", "trimesh")
+SCRATCH = ".partial-"  # first letters of a folder that is being written
 COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim")
 
 
@@ -29,7 +30,7 @@ def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
 
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / result_folder(result)
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+    with tempfile.TemporaryDirectory(dir=folder, prefix=SCRATCH) as scratch:
         made = Path(scratch) / target.name
         made.mkdir()
         pd.DataFrame([_record(cell) for cell in result.cells], columns=list(COLUMNS)).to_csv(

@@ -8,9 +8,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from experiments.commands.terminal import print_table, progress
-from experiments.registry import experiment_names, load_experiment, select
+from experiments.jobs import default_jobs, run_experiments
+from experiments.registry import experiment_names, select
 from experiments.result import Result
-from experiments.write import COLUMNS, cell_texts, write_index, write_result
+from experiments.write import COLUMNS, cell_texts, write_index
+from models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
 
@@ -20,6 +22,7 @@ def reproduce(
     all_: Annotated[bool, Parameter(name="--all", negative="")] = False,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    jobs: Annotated[int | None, Parameter(name=["--jobs", "-j"])] = None,
 ) -> None:
     """Print published tables beside what the model computes, cell by cell, and write CSV, manifests, plots and a page.
 
@@ -33,15 +36,14 @@ def reproduce(
         Folder for the results.
     json_
         Print one JSON object instead of tables.
+    jobs
+        Processes that run experiments side by side; one a core, two at most, if not given.
     """
-    results: list[Result] = []
     chosen = select(names, everything=all_)
-    with progress("reproducing") as say:
-        for number, name in enumerate(chosen, 1):
-            say(f"{name} ({number} of {len(chosen)})")
-            result = load_experiment(name)(say)
-            write_result(result, output, {"names": list(names)})
-            results.append(result)
+    if jobs is not None and jobs < 1:
+        raise TilestampError(f"{jobs} jobs: at least one process is needed")
+    with progress(f"reproducing {len(chosen)} experiments") as say:
+        results = run_experiments(chosen, output, {"names": list(names)}, say, jobs or default_jobs())
         page = write_index(results, output)
     if json_:
         cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
