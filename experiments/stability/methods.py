@@ -98,27 +98,29 @@ def barycentrics(points: NDArray[np.float64], size: int) -> Cover:
     """Cover as ``tiled`` and ``per-primitive`` do: three float32 barycentrics between 0 and 1."""
     screen = _screen(points, size)
     count = np.zeros((size, size), np.int64)
-    _barycentric_cover(screen, np.arange(len(screen), dtype=np.int32).reshape(-1, 3), count)
+    barycentric_cover(screen, np.arange(len(screen), dtype=np.int32).reshape(-1, 3), count)
     return Cover(count[::-1] > 0, int(count.sum()))
 
 
 def edge_planes(points: NDArray[np.float64], size: int) -> Cover:
     """Cover as ``binned`` does: float32 planes a*x + b*y + c over the screen, stepped through 8x8-pixel tiles."""
-    p = points.astype(np.float32)
+    return plane_cover(points.astype(np.float32), size)
+
+
+def plane_cover(p: NDArray[np.float32], size: int) -> Cover:
+    """Cover float32 screen triangles (T, 3, 2) as ``binned`` does."""
     a, b, c = p[:, 0], p[:, 1], p[:, 2]
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    p[signed < 0] = p[signed < 0][:, [0, 2, 1]]
+    p = np.where((signed < 0)[:, None, None], p[:, [0, 2, 1]], p)
     edges = plane_edges(p)
     count = np.zeros((size, size), np.int64)
     for t in np.flatnonzero(signed != 0):
-        low = np.clip(p[t].min(axis=0) // TILE, 0, size // TILE - 1).astype(int)
-        high = np.clip(p[t].max(axis=0) // TILE, 0, size // TILE - 1).astype(int)
+        low, high = (np.clip(v // TILE, 0, size // TILE - 1).astype(int) for v in (p[t].min(axis=0), p[t].max(axis=0)))
         for row in range(low[1], high[1] + 1):
             for column in range(low[0], high[0] + 1):
                 mask = int(coverage(edges[t], column * TILE, row * TILE, TILE, TILE))
-                bits = np.frombuffer(mask.to_bytes(8, "little"), np.uint8)
-                inside_tile = np.unpackbits(bits, bitorder="little").reshape(TILE, TILE)
-                count[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE] += inside_tile
+                bits = np.unpackbits(np.frombuffer(mask.to_bytes(8, "little"), np.uint8), bitorder="little")
+                count[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE] += bits.reshape(TILE, TILE)
     return Cover(count > 0, int(count.sum()))
 
 
@@ -134,7 +136,7 @@ def stamp(points: NDArray[np.float64], size: int) -> Cover:
     count = np.zeros((size, size), np.int64)
     polygons = np.zeros((len(points), 3, 3), np.float32)
     polygons[..., :2] = _downward(points, size)
-    _stamp_cover(polygons, *new_setup(), count)
+    stamp_cover(polygons, *new_setup(), count)
     return Cover(count[::-1] > 0, int(count.sum()))
 
 
@@ -169,14 +171,14 @@ def _grid_cover(corners: NDArray[np.float64], size: int) -> Cover:
 
 def _screen(points: NDArray[np.float64], size: int) -> NDArray[np.float32]:
     """Corners as Ru's vertex shading leaves them: pixels right and down, depth, 1/w."""
-    screen = np.ones((points.size // 2, 4), np.float32)
+    screen = np.full((points.size // 2, 4), _HALF)
     screen[:, :2] = _downward(points, size).reshape(-1, 2)
     return screen
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
-    """Test every pixel of every triangle's box."""
+def barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
+    """Count the triangles of each pixel, (H, W) from the top; ``screen`` as Ru's vertex shading leaves it."""
     for t in range(len(triangles)):
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
         twice = area(x0, y0, x1, y1, x2, y2)
@@ -188,12 +190,13 @@ def _barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
                 a, b, c = barycentric(
                     x0, y0, x1, y1, x2, y2, _ONE / twice, np.float32(x) + _HALF, np.float32(y) + _HALF
                 )
-                count[y, x] += inside(a, b, c)
+                z = a * screen[triangles[t, 0], 2] + b * screen[triangles[t, 1], 2] + c * screen[triangles[t, 2], 2]
+                count[y, x] += inside(a, b, c) and z >= np.float32(0.0) and z < _ONE
 
 
 @njit(cache=True, nogil=True)
-def _stamp_cover(polygons: Any, edges: Any, boxes: Any, depths: Any, snapped: Any, count: Any) -> None:
-    """Test every pixel of every polygon's box."""
+def stamp_cover(polygons: Any, edges: Any, boxes: Any, depths: Any, snapped: Any, count: Any) -> None:
+    """Count the polygons of each pixel, (H, W) from the top; ``new_setup`` gives the scratch."""
     for p in range(len(polygons)):
         set_up(polygons[p], edges, boxes, depths, snapped)
         for y in range(max(boxes[0, 1] // STEP, 0), min(boxes[0, 3] // STEP + 1, count.shape[0])):
