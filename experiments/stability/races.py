@@ -1,0 +1,121 @@
+"""Unordered writes: a fragment written after its depth, unprotected (Ru 2016), over many orders of the warps.
+
+Between a thread's atomicMin and its write another thread may put a nearer depth and write first: the farther fragment
+is left standing. The same frame is drawn in many orders of its warps, each a possible run of the machine; the map
+shows in what share of the runs a pixel is wrong.
+"""
+
+from functools import cache
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.registry import Progress
+from experiments.result import Figure, Result
+from experiments.stability.boundary import Boundary, atlas_result, bisect
+from experiments.stability.layers import layered
+from reports.heatmap import heat_map
+from reports.plots import lines
+from simulator.simulation import simulate
+
+if TYPE_CHECKING:
+    from simulator.run import Run
+
+SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
+
+SIZE = 96  # pixels a side
+CELLS = 16  # 512 triangles a layer, 36 pixels each on screen
+LAYERS = (1, 2, 3, 4, 6, 8, 12, 16)
+SEEDS = 25
+SHOWN = 8  # layers of the map
+MACHINE = "gt750m"  # Ru's
+
+
+@cache
+def frame(layers: int, seed: int) -> "Run":
+    """Draw the layers in one order of the warps."""
+    return simulate(layered(layers, CELLS, seed), "per-primitive", MACHINE, width=SIZE, height=SIZE)
+
+
+@cache
+def wrong(layers: int, seed: int) -> NDArray[np.bool_]:
+    """Pixels that show a triangle that is not the nearest."""
+    truth = simulate(
+        layered(layers, CELLS, seed), "per-primitive", MACHINE, width=SIZE, height=SIZE, race=False, fidelity="counts"
+    )
+    shown = frame(layers, seed).triangle_ids
+    return np.not_equal(shown, truth.triangle_ids)
+
+
+def wrong_runs(layers: int, seeds: int = SEEDS) -> NDArray[np.float64]:
+    """Share of the runs in which each pixel is wrong."""
+    return np.mean([wrong(layers, seed) for seed in range(1, seeds + 1)], axis=0)
+
+
+def boundary(seeds: int = SEEDS) -> tuple[float | None, float | None]:
+    """Layers that never go wrong, and layers that do."""
+    return bisect(lambda layers: bool(wrong_runs(int(layers), seeds).any()), LAYERS[0], LAYERS[-1], scale="integer")
+
+
+def run(progress: Progress) -> Result:
+    """Draw more and more layers in many orders."""
+    import pandas as pd
+
+    rows = []
+    for layers in LAYERS:
+        progress(f"stability/races: {layers} layers, {SEEDS} orders")
+        percent = [100 * float(wrong(layers, seed).mean()) for seed in range(1, SEEDS + 1)]
+        spread = {"worst run": max(percent), "mean": float(np.mean(percent)), "best run": min(percent)}
+        rows += [{"layers": layers, "runs": name, "wrong": share} for name, share in spread.items()]
+    table = pd.DataFrame(rows)
+    shares = wrong_runs(SHOWN)
+    safe = simulate(layered(SHOWN, CELLS), "tiled", MACHINE, width=SIZE, height=SIZE)
+    ever, always = 100 * float((shares > 0).mean()), 100 * float((shares == 1).mean())
+    found = Boundary(
+        "per-primitive",
+        "layers over a pixel",
+        "",
+        *boundary(),
+        f"with {SHOWN} layers {ever:.0f} % of the pixels are wrong in one of {SEEDS} runs, {always:.2f} % in all",
+        "a block a tile, depth and colour in registers (pipeline tiled)",
+        f"{safe.milliseconds:.4g} ms instead of {frame(SHOWN, 0).milliseconds:.4g} on {MACHINE}",
+    )
+    figures = [
+        Figure(
+            "map",
+            lambda path: heat_map(
+                shares,
+                path,
+                title=f"Share of {SEEDS} runs in which a pixel is wrong, {SHOWN} layers",
+                unit="share of the runs",
+                width=SIZE,
+                height=SIZE,
+            ),
+        ),
+        Figure(
+            "layers",
+            lambda path: lines(
+                table,
+                path,
+                x="layers",
+                y="wrong",
+                by="runs",
+                title=f"Pixels left wrong by unprotected writes, {SEEDS} orders of the warps",
+                x_label="layers over a pixel",
+                y_label="pixels that are wrong [%]",
+            ),
+        ),
+    ]
+    notes = [
+        f"Between two runs of {SHOWN} layers {_between():.2f} % of the pixels differ on average.",
+        "How many rounds a write may be late (1 to 3) is assumed; with another number the shares change, not the cure.",
+    ]
+    return atlas_result("stability/races", "Unordered writes", [found], figures, notes, {"layers": table})
+
+
+def _between() -> float:
+    """Mean share of pixels in which a run differs from the next, percent."""
+    runs = [wrong(SHOWN, seed) for seed in range(1, SEEDS + 1)]
+    return 100 * float(np.mean([(a != b).mean() for a, b in pairwise(runs)]))
