@@ -84,7 +84,7 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     return Demand(
         issue=issue,
         shared=passes * memory.bank_pass_cycles,
-        l1=bytes_moved / memory.l1_bytes_per_clock + _sent(events, machine),
+        l1=_l1_cycles(events, machine) + _sent(events, machine),
         dram=share * (moved.dram_bytes / machine.dram_bytes_per_cycle),
         l2=share * l2_cycles,
         atomic=_atomic(events, machine) + (queue if machine.atomics.place == "dram_lock" else 0.0),
@@ -92,6 +92,14 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
         chain=chain,
         alone=np.maximum(chain, issue * spread),
     )
+
+
+def _l1_cycles(events: Cycles, machine: Machine) -> Cycles:
+    """Cycles of the SM's load and store path: stores may be slower than loads."""
+    memory = machine.memory
+    stores = events[:, E.STORE_BYTES] / (memory.l1_write_bytes_per_clock or memory.l1_bytes_per_clock)
+    cycles: Cycles = events[:, E.LOAD_BYTES] / memory.l1_bytes_per_clock + stores
+    return cycles
 
 
 def _l2_cycles(moved: Traffic, machine: Machine) -> float:

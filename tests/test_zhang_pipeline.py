@@ -13,8 +13,8 @@ from simulator.mix import load_mix
 from simulator.pipelines.binned import binned
 from simulator.scenes.camera import LookAt
 from simulator.scenes.scene import Mesh, Scene
-from simulator.stages.zhang2025.coarse_rasterizer import DEPTH_STEPS
-from simulator.stages.zhang2025.fine_rasterizer import quad_mask
+from simulator.stages.zhang2025.depth import DEPTH_STEPS
+from simulator.stages.zhang2025.fine_tile import quad_mask
 from simulator.stages.zhang2025.primitive_compaction import most_triangles
 from tests import naive_textured as naive
 from tests.test_ru_pipelines import soup

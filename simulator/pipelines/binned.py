@@ -18,7 +18,8 @@ from simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, p
 from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from simulator.stages.zhang2025.primitive_binning import primitive_binning
 from simulator.stages.zhang2025.primitive_compaction import primitive_compaction
-from simulator.stages.zhang2025.rop import KEPT, Order, RopEvent, rop
+from simulator.stages.zhang2025.rop import KEPT, Order, rop
+from simulator.stages.zhang2025.rop_block import RopEvent
 from simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
 from simulator.stages.zhang2025.triangle_setup import triangle_setup
 from simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
@@ -73,7 +74,7 @@ def binned(
     vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
     slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=cull_backfaces)
     primitives, compaction = primitive_compaction(slots, len(mesh.triangles), simt)
-    data, setup = triangle_setup(primitives, simt)
+    data, setup = triangle_setup(primitives, simt, triangles=len(mesh.triangles))
     bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))
     tiles, coarse = coarse_rasterizer(data, bins, width, height, simt, hi_z=opaque, unrolled=optimized)
     fragments, fine = fine_rasterizer(data, tiles, width, height, simt, early_z=opaque, optimized=optimized)

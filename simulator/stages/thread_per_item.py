@@ -51,6 +51,7 @@ def thread_per_item(
     simt: Simt,
     loads: tuple[Access, ...] = (),
     stores: tuple[Access, ...] = (),
+    idle_blocks: int = 0,
 ) -> Work:
     """Make the work table of a kernel whose thread i handles item i.
 
@@ -64,6 +65,8 @@ def thread_per_item(
         Threads in a block.
     simt : Simt
     loads, stores : tuple of Access
+    idle_blocks : int
+        Further blocks of the launch, whose threads find no item.
 
     Returns
     -------
@@ -87,7 +90,8 @@ def thread_per_item(
             footprint = items * access.stride
             moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
             streams.append(Stream(access.buffer, op, moved, footprint))  # type: ignore[arg-type]
-    return Work(stage, kernel, ThreadEvent, table, blocks, block, streams=tuple(streams))
+    table = np.concatenate([table, np.zeros((idle_blocks, len(ThreadEvent)), np.int64)])
+    return Work(stage, kernel, ThreadEvent, table, len(table), block, streams=tuple(streams))
 
 
 def record_transactions(access: Access, simt: Simt) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from models.errors import TilestampError
 from models.launch import Stream
 from models.simt import Simt
 from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
+from simulator.stages.zhang2025.triangle_setup import launched_blocks
 from simulator.work import Work
 
 BLOCK = 256  # threads, and primitives a sub-queue
@@ -23,6 +24,7 @@ BIN = 128  # pixels
 BINS_A_ROW = 16
 MAX_BINS = 256
 CHUNK = 64  # queue entries
+SHARED_BYTES = 4 * (2 * 8 * 257 + 32 + 1)  # counts and masks of each warp and bin, a scan
 
 
 class PrimitiveBinningEvent(IntEnum):
@@ -108,7 +110,8 @@ def primitive_binning(
         Pixels: at most 16 bins each way.
     simt : Simt
     triangles : int
-        Triangles of the model: the original launches blocks for twice as many primitives.
+        Triangles of the model: the original launches blocks for twice as many primitives, and blocks without one
+        run the ballots and scans too.
 
     Raises
     ------
@@ -121,33 +124,34 @@ def primitive_binning(
             f"the binned pipeline has 16x16 bins of 128 pixels: {width}x{height} does not fit in 2048x2048"
         )
     work_blocks = max(1, -(-len(boxes) // BLOCK))
-    blocks = max(work_blocks, -(-2 * triangles // BLOCK))
+    blocks = max(work_blocks, launched_blocks(triangles))
     events = np.zeros((blocks, len(PrimitiveBinningEvent)), np.int64)
     counts = np.zeros((work_blocks, MAX_BINS), np.int64)
     _count(boxes, columns, rows, simt.warp, counts, events)
     starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))]).astype(np.int64)
     entries = np.empty(int(starts[-1]), np.int32)
     _fill(boxes, columns, rows, starts[:-1].copy(), entries)
-    _add_costs(events[:work_blocks], counts, len(boxes), simt)
+    _add_costs(events, counts, len(boxes), simt)
     total = events.sum(axis=0)
     streams = (
         Stream("compacted", "load", int(total[10]), len(boxes) * PRIMITIVE_BYTES),
         Stream("bin_queue", "store", int(total[12]), 4 * len(entries) + 8 * MAX_BINS * work_blocks),
     )
     stage = "PrimitiveBinning"
-    return BinQueues(starts, entries), Work(stage, stage, PrimitiveBinningEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(stage, stage, PrimitiveBinningEvent, events, blocks, BLOCK, SHARED_BYTES, streams=streams)
+    return BinQueues(starts, entries), work
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives: int, simt: Simt) -> None:
     """Add what follows from the counts: chunks, one atomicAdd a block, memory."""
     event = PrimitiveBinningEvent
     segment = 128 if simt.coalescing == 2 else 32
-    lanes = np.full(len(events), BLOCK)
-    lanes[-1] = primitives - (len(events) - 1) * BLOCK
+    working = events[: len(counts)]
+    lanes = np.clip(primitives - BLOCK * np.arange(len(events)), 0, BLOCK)
     events[:, event.WARPS] = BLOCK // simt.warp
     events[:, event.WARP_LANES] = lanes
-    events[:, event.ENTRIES] = counts.sum(axis=1)
-    events[:, event.CHUNKS] = (-(-counts // CHUNK)).sum(axis=1)
+    working[:, event.ENTRIES] = counts.sum(axis=1)
+    working[:, event.CHUNKS] = (-(-counts // CHUNK)).sum(axis=1)
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[:, name] = 1
     events[:, event.LOAD_TRANSACTIONS] = 6 * lanes + events[:, event.ENTRIES]  # corners 112 bytes apart, queue bases

@@ -7,10 +7,11 @@ screen coordinates, so it is large and loses bits. The original's one-pixel hole
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
 from simulator.stages.zhang2025.vertex_fetch_and_shading import VARYINGS
@@ -18,6 +19,8 @@ from simulator.work import Work
 
 BLOCK = 256  # threads
 SETUP_BYTES = 140
+MOST_COMPACTED = 2048  # primitives that blocks are launched for at least
+SMALLEST_PART = 4096  # primitives of a thread's part
 DEPTH, ONE_OVER_W, NORMAL, UV, COLOR = 0, 1, 2, 5, 7  # rows of ``planes``
 PLANES = 2 + VARYINGS
 _ONE = np.float32(1.0)
@@ -69,9 +72,9 @@ def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> Non
         box[2 + d] = max(screen[0, d], screen[1, d], screen[2, d])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
-def _triangle_setup(screen: Any, varyings: Any, edges: Any, planes: Any, boxes: Any) -> None:
-    for p in prange(len(screen)):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _triangle_setup(part: int, parts: int, screen: Any, varyings: Any, edges: Any, planes: Any, boxes: Any) -> None:
+    for p in range(part * len(screen) // parts, (part + 1) * len(screen) // parts):
         _setup(screen[p], varyings[p], edges[p], planes[p], boxes[p])
 
 
@@ -81,7 +84,7 @@ def evaluate(plane: Any, x: Any, y: Any) -> Any:
     return plane[0] * x + plane[1] * y + plane[2]
 
 
-def triangle_setup(primitives: Primitives, simt: Simt) -> tuple[TriangleSetupData, Work]:
+def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) -> tuple[TriangleSetupData, Work]:
     """Set up all primitives.
 
     Parameters
@@ -89,6 +92,8 @@ def triangle_setup(primitives: Primitives, simt: Simt) -> tuple[TriangleSetupDat
     primitives : Primitives
         Compacted.
     simt : Simt
+    triangles : int
+        Triangles of the model: the original launches blocks for twice as many primitives, and for 2,048 at least.
 
     Returns
     -------
@@ -101,7 +106,14 @@ def triangle_setup(primitives: Primitives, simt: Simt) -> tuple[TriangleSetupDat
         np.empty((count, 4), np.float32),
         primitives.ids,
     )
-    _triangle_setup(primitives.screen, primitives.varyings, *data[:3])
+    for_parts(_triangle_setup, parts_of(count, SMALLEST_PART), primitives.screen, primitives.varyings, *data[:3])
     loads = (Access("compacted", PRIMITIVE_BYTES, PRIMITIVE_BYTES // 4),)
     stores = (Access("setup", SETUP_BYTES, SETUP_BYTES // 4),)
-    return data, thread_per_item("TriangleSetup", "TriangleSetup", count, BLOCK, simt, loads, stores)
+    idle = max(0, launched_blocks(triangles) - max(1, -(-count // BLOCK)))
+    stage = "TriangleSetup"
+    return data, thread_per_item(stage, stage, count, BLOCK, simt, loads, stores, idle_blocks=idle)
+
+
+def launched_blocks(triangles: int) -> int:
+    """Blocks that the original launches for TriangleSetup and PrimitiveBinning, not knowing what compaction left."""
+    return -(-max(2 * triangles, MOST_COMPACTED) // BLOCK)

@@ -1,0 +1,143 @@
+"""One block of the PixelShader (Zhang 2025, stage 8): quads, derivatives, texels, light (device functions)."""
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from models.coalescing import transactions
+from simulator.scenes.texture import (
+    TEXEL_BYTES,
+    add_bilinear,
+    add_trilinear,
+    footprint,
+    level_of_detail,
+    nearest,
+    texel_index,
+)
+from simulator.stages.zhang2025.triangle_setup import COLOR, NORMAL, ONE_OVER_W, UV, evaluate
+
+BLOCK = 256  # threads
+QUADS_A_WARP = 8
+NEAREST, BILINEAR, TRILINEAR = 0, 1, 2
+AMBIENT = np.float32(0.2)
+DIFFUSE = np.float32(0.8)
+_HALF = np.float32(0.5)
+_ONE = np.float32(1.0)
+_ZERO = np.float32(0.0)
+
+
+class PixelShaderEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0  # warps with a fragment
+    WARP_LANES = 1
+    EMPTY_WARPS = 2  # warps beyond the stream's end, that return at once
+    TEXEL_LOADS = 3  # warp loads of texels
+    TEXEL_LANES = 4
+    TEXTURE_TRANSACTIONS = 5
+    TEXTURE_BYTES = 6
+    ATOMIC = 7
+    ATOMIC_LANES = 8
+    ATOMIC_REQUESTS = 9
+    ATOMIC_DEPTH = 10
+    LOAD_TRANSACTIONS = 11
+    LOAD_BYTES = 12
+    STORE_TRANSACTIONS = 13
+    STORE_BYTES = 14
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _coordinates(planes: Any, place: Any, uv: Any) -> None:
+    """Perspective-correct texture coordinates of a quad's four pixels, (4, 2)."""
+    for k in range(4):
+        x, y = np.float32(place[0] + k % 2) + _HALF, np.float32(place[1] + k // 2) + _HALF
+        w = _ONE / evaluate(planes[ONE_OVER_W], x, y)
+        uv[k, 0] = evaluate(planes[UV], x, y) * w
+        uv[k, 1] = evaluate(planes[UV + 1], x, y) * w
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _light(planes: Any, x: Any, y: Any) -> Any:
+    """Light from the eye; the factor w of the normal cancels in its direction."""
+    nx, ny = evaluate(planes[NORMAL], x, y), evaluate(planes[NORMAL + 1], x, y)
+    nz = evaluate(planes[NORMAL + 2], x, y)
+    length = nx * nx + ny * ny + nz * nz
+    return AMBIENT + DIFFUSE * abs(nz) / np.sqrt(length) if length > _ZERO else _ONE
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shade_quad(
+    planes: Any, chains: Any, texture: int, method: int, opacity: Any, place: Any, uv: Any, out: Any
+) -> Any:
+    """Colours of a quad; returns its level of detail."""
+    lod = _ZERO
+    if texture >= 0:
+        _coordinates(planes, place, uv)
+        if method == TRILINEAR:
+            lod = level_of_detail(
+                chains, texture, uv[1, 0] - uv[0, 0], uv[1, 1] - uv[0, 1], uv[2, 0] - uv[0, 0], uv[2, 1] - uv[0, 1]
+            )
+    for k in range(4):
+        x, y = np.float32(place[0] + k % 2) + _HALF, np.float32(place[1] + k // 2) + _HALF
+        out[k] = _ONE if texture < 0 else _ZERO
+        if texture >= 0 and method == TRILINEAR:
+            add_trilinear(chains, texture, lod, uv[k, 0], uv[k, 1], out[k])
+        elif texture >= 0 and method == BILINEAR:
+            add_bilinear(chains, texture, 0, uv[k, 0], uv[k, 1], _ONE, out[k])
+        elif texture >= 0:
+            nearest(chains, texture, uv[k, 0], uv[k, 1], out[k])
+        w = _ONE / evaluate(planes[ONE_OVER_W], x, y)
+        light = _light(planes, x, y)
+        for c in range(3):
+            out[k, c] *= evaluate(planes[COLOR + c], x, y) * w * light
+        out[k, 3] *= evaluate(planes[COLOR + 3], x, y) * w * opacity
+    return lod
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: int, addresses: Any) -> None:
+    """Byte addresses of the texels that a quad's four lanes load, ``addresses`` (8, lanes)."""
+    levels = 2 if method == TRILINEAR else 1
+    for k in range(4):
+        for n in range(levels):
+            level = min(int(lod) + n, chains.counts[texture] - 1)
+            x, y, _, _ = footprint(chains, texture, level, uv[k, 0], uv[k, 1])
+            if method == NEAREST:
+                x = int(np.floor(uv[k, 0] * np.float32(chains.levels[texture, 0, 1])))
+                y = int(np.floor(uv[k, 1] * np.float32(chains.levels[texture, 0, 2])))
+            for corner in range(1 if method == NEAREST else 4):
+                i = texel_index(chains, texture, level, x + corner % 2, y + corner // 2)
+                addresses[4 * n + corner, lane + k] = i * TEXEL_BYTES
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def shade_block(
+    quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any, method: int,
+    opacity: Any, rule: int, first: int, colors: Any, row: Any,
+) -> None:  # fmt: skip
+    """One block: eight warps of eight quads."""
+    uv = np.zeros((4, 2), np.float32)
+    addresses = np.empty((8, 4 * QUADS_A_WARP), np.int64)
+    for warp in range(first, min(first + BLOCK // 4, len(quads)), QUADS_A_WARP):
+        addresses[:] = -1
+        textured = 0
+        end = min(warp + QUADS_A_WARP, len(quads))
+        for q in range(warp, end):
+            p = queue[quads[q]]
+            texture = texture_ids[ids[p]]
+            lod = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
+            if row is not None and texture >= 0:
+                _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
+                textured += 4
+        if row is not None:
+            row[0] += 1
+            row[1] += 4 * (end - warp)
+            loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
+            row[3] += loads
+            row[4] += loads * textured
+            for n in range(loads):
+                count, size = transactions(addresses[n], 4 * QUADS_A_WARP, TEXEL_BYTES, rule)
+                row[5] += count
+                row[6] += size
