@@ -73,7 +73,7 @@ def run(progress: Progress) -> Result:
             "distance of two sheets",
             "NDC depth",
             *boundary(packing),
-            f"halves of two colours meet: {max(r['mixed'] for r in rows if r['packing'] == f'{packing} bits'):.0f} % of"
+            f"halves of two colours meet: {table[table.packing == f'{packing} bits'].mixed.max():.0f} % of"
             " the pixels at worst",
             "one 64-bit atomicMin" if packing == "32" else "",
             f"{whole:.4g} ms instead of {halves:.4g} on {MACHINE}" if packing == "32" else "",

@@ -45,13 +45,16 @@ def wrong(layers: int, seed: int) -> NDArray[np.bool_]:
     truth = simulate(
         layered(layers, CELLS, seed), "per-primitive", MACHINE, width=SIZE, height=SIZE, race=False, fidelity="counts"
     )
-    shown = frame(layers, seed).triangle_ids
-    return np.not_equal(shown, truth.triangle_ids)
+    shown, nearest = frame(layers, seed).triangle_ids, truth.triangle_ids
+    assert shown is not None  # noqa: S101 - it draws triangles
+    assert nearest is not None  # noqa: S101
+    return np.not_equal(shown, nearest)
 
 
 def wrong_runs(layers: int, seeds: int = SEEDS) -> NDArray[np.float64]:
     """Share of the runs in which each pixel is wrong."""
-    return np.mean([wrong(layers, seed) for seed in range(1, seeds + 1)], axis=0)
+    shares: NDArray[np.float64] = np.mean([wrong(layers, seed) for seed in range(1, seeds + 1)], axis=0)
+    return shares
 
 
 def boundary(seeds: int = SEEDS) -> tuple[float | None, float | None]:

@@ -1,0 +1,140 @@
+"""CudaRaster's queues: what outgrows the room of the first attempt, and what drawing again costs (Laine & Karras 2011).
+
+Section 7: queues begin with room by the number of triangles; where one is too small the draw is repeated with larger
+buffers, so that nothing is lost but time. Three queues can overflow: sub-triangles, where many triangles are clipped;
+segments of bins and of tiles, where few triangles cover many of them.
+"""
+
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.registry import Progress
+from experiments.result import Figure, Result
+from experiments.stability.boundary import Boundary, atlas_result, bisect
+from experiments.stability.patch_frames import milliseconds, simt_of
+from reports.plots import lines
+from simulator.stages.laine2011 import bin_raster as bins
+from simulator.stages.laine2011 import coarse_raster as tiles
+from simulator.stages.laine2011.triangle_setup import SLACK, triangle_setup
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+    from simulator.work import Work
+
+SIZE = 512  # pixels a side: 16 bins, 4096 tiles
+MACHINE = "gtx480"
+COUNTS = (16, 32, 64, 128, 256, 512)  # triangles over the whole screen
+SHAPES = {"sub-triangles": "clipped", "bin segments": "screen, bins only", "tile segments": "screen"}
+MOST = {"sub-triangles": 8192, "bin segments": 32768, "tile segments": 512}  # triangles
+
+
+class Attempt(NamedTuple):
+    """What a draw needs and has, by queue, and the works that a retry repeats."""
+
+    needed: dict[str, int]
+    room: dict[str, int]
+    works: "tuple[Work, ...]"
+
+    def overflows(self, queue: str) -> bool:
+        """Whether a queue is too small."""
+        return self.needed[queue] > self.room[queue]
+
+
+@cache
+def attempt(count: int, shape: str = "screen") -> Attempt:
+    """Set up, bin and queue ``count`` triangles that cover the screen, or are clipped by all planes (``clipped``)."""
+    positions = _clipped() if shape == "clipped" else _screen()
+    triangles = np.tile(np.arange(3, dtype=np.int32), (count, 1))
+    given: dict[str, Any] = {"width": SIZE, "height": SIZE, "simt": simt_of(MACHINE), "release": "1.1"}
+    setup, setup_work, facts = triangle_setup(positions, triangles, **given, capacity=8 * count + SLACK)
+    queues, bin_work, bin_facts = bins.bin_raster(setup, **given)
+    needed = {"sub-triangles": facts["numSubtris"], "bin segments": bin_facts["num_bin_segments"]}
+    room = {"sub-triangles": count + SLACK, "bin segments": bins.initial_capacity(count, SIZE, SIZE)}
+    works = [setup_work, bin_work]
+    if shape == "screen":
+        _, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=True, **given)
+        needed["tile segments"] = tile_facts["num_tile_segments"]
+        room["tile segments"] = tiles.initial_capacity(count, SIZE, SIZE)
+        works.append(tile_work)
+    return Attempt(needed, room, tuple(works))
+
+
+def _screen() -> NDArray[np.float32]:
+    """A triangle that just holds the screen."""
+    return np.array([[-1, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]], np.float32)
+
+
+def _clipped() -> NDArray[np.float32]:
+    """A triangle that leaves the guard band on all sides, and both depth planes: a polygon of many corners."""
+    return np.array([[-60, -55, -2, 1], [70, -40, 2, 1], [-5, 65, 0.3, 1]], np.float32)
+
+
+def boundary(queue: str) -> tuple[float | None, float | None]:
+    """Triangles that fit, and triangles that need a retry."""
+    return bisect(
+        lambda count: attempt(int(count), SHAPES[queue]).overflows(queue), COUNTS[0], MOST[queue], scale="integer"
+    )
+
+
+def run(progress: Progress) -> Result:
+    """Add triangles until a queue is full."""
+    import pandas as pd
+
+    rows = []
+    for count in COUNTS:
+        progress(f"stability/retries: {count} triangles")
+        made = attempt(count)
+        rows += [
+            {"triangles": count, "queue": queue, "needed": made.needed[queue], "room": made.room[queue]}
+            for queue in made.needed
+        ]
+    table = pd.DataFrame(rows).assign(full=lambda t: t.needed / t.room)
+    progress("stability/retries: boundaries")
+    boundaries = [_boundary(queue) for queue in ("sub-triangles", "bin segments", "tile segments")]
+    figures = [Figure("queues", lambda path: _plot(table, path))]
+    return atlas_result(
+        "stability/retries", "CudaRaster's queues overflow and the draw is repeated", boundaries, figures, [],
+        {"queues": table},
+    )  # fmt: skip
+
+
+def _boundary(queue: str) -> Boundary:
+    holds, breaks = boundary(queue)
+    what = "triangles clipped by all planes" if queue == "sub-triangles" else "triangles over the whole screen"
+    cost = ""
+    if breaks is not None:
+        made = attempt(int(breaks), SHAPES[queue])
+        repeated = {"sub-triangles": 1, "bin segments": 2, "tile segments": 3}[queue]
+        again = milliseconds(made.works[:repeated], MACHINE, "cudaraster")
+        cost = f"{again:.4g} ms of {', '.join(w.stage for w in made.works[:repeated])} are spent again"
+    return Boundary(
+        f"cudaraster, {queue} at {SIZE}x{SIZE}",
+        what,
+        "",
+        holds,
+        breaks,
+        "the queue is too small for the first attempt; nothing is lost",
+        "draw again with more room" if cost else "",
+        cost,
+    )
+
+
+def _plot(table: "pd.DataFrame", path: "Path") -> None:
+    lines(
+        table,
+        path,
+        x="triangles",
+        y="full",
+        by="queue",
+        title="Room that CudaRaster needs over the room of its first attempt",
+        x_label=f"triangles over the whole screen of {SIZE}x{SIZE} pixels",
+        y_label="needed / room",
+        log_x=True,
+        log_y=True,
+    )
