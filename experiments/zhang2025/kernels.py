@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.result import Cell, Figure, Result
-from experiments.zhang2025.setting import CANDIDATES, SOURCE, bunny, draw, published
+from experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE, bunny, draw, profiled, published
 from models.machine import load_machine
 from models.price import price
 from models.timing import Timing
@@ -41,7 +41,7 @@ def run(progress: Callable[[str], None]) -> Result:
         ratios = []
         for column, optimized in (("before_us", False), ("after_us", True)):
             progress(f"{machine} {column}")
-            timings = profile(draw(scene, machine, optimized=optimized))
+            timings = profile(draw(scene, machine, optimized=optimized).on(profiled(machine)))
             times = {kernel: timing.milliseconds * 1e3 for kernel, timing in timings.items()}
             for kernel, asked in table[column].items():
                 name = f"{machine} {column.removesuffix('_us')}"
