@@ -1,9 +1,10 @@
 """Maps over two parameters: a panel a method, a cell a run, all on one scale."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reports.style import HEAT, figure
 
@@ -25,7 +26,7 @@ def value_maps(
     log_y: bool = False,
     top: float = 1.0,
 ) -> None:
-    """Draw tables whose columns are x and whose index is y; NaN stays white.
+    """Draw tables whose columns are x and whose index is y, numbers or names; NaN stays white.
 
     Parameters
     ----------
@@ -44,20 +45,33 @@ def value_maps(
     size = (5.2 * columns, 3.2 * rows + 0.6)
     with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, (name, table) in zip(grid.flat, maps.items(), strict=False):
-            x, y = (_edges(np.asarray(v, np.float64), log) for v, log in ((table.columns, log_x), (table.index, log_y)))
+            x, y = _edges(table.columns, log_x), _edges(table.index, log_y)
             image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
             axes.grid(visible=False)
             axes.set(title=name, xlabel=x_label, ylabel=y_label)
             axes.figure.colorbar(image, ax=axes, label=unit)
             axes.set_xscale("log" if log_x else "linear")
             axes.set_yscale("log" if log_y else "linear")
+            _name(axes.xaxis, table.columns, rotation=60)
+            _name(axes.yaxis, table.index)
         for axes in grid.flat[len(maps) :]:
             axes.set_visible(False)
 
 
-def _edges(values: np.ndarray, log: bool) -> np.ndarray:
-    """Borders of cells around values."""
+def _edges(labels: "pd.Index", log: bool) -> NDArray[np.float64]:
+    """Borders of cells around values, or around the places of names."""
+    values = np.arange(len(labels)) if _are_names(labels) else np.asarray(labels, np.float64)
     at = np.log(values) if log else values
     middle = (at[1:] + at[:-1]) / 2
     edges = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
     return np.exp(edges) if log else edges
+
+
+def _are_names(labels: "pd.Index") -> bool:
+    return isinstance(labels[0], str)
+
+
+def _name(axis: Any, labels: "pd.Index", **style: Any) -> None:
+    """Write names at their places."""
+    if _are_names(labels):
+        axis.set_ticks(range(len(labels)), list(labels), fontsize=8, **style)

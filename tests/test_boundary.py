@@ -58,6 +58,6 @@ def test_a_row_says_what_holds_what_breaks_and_what_the_cure_costs():
     ]
     assert result.notes == [
         "m: from aspect 9 :1, a hole. Cure: snapping (+1 ms).",
-        "n: never breaks up to aspect 64 :1.",
+        "Never breaks up to aspect 64 :1: n.",
     ]
     assert next(iter(result.tables["boundaries"].breaks)) == 9.0

@@ -137,10 +137,10 @@ def atlas_result(
         As in ``Result``; every claim in a note is a number from the run. ``boundaries`` is added to the tables.
     """
     cells = [cell for boundary in boundaries for cell in _cells(boundary)]
-    sentences = [_sentence(boundary) for boundary in boundaries]
+    sentences = [_sentence(boundary) for boundary in boundaries if boundary.breaks is not None]
     tables = {"boundaries": boundary_table(boundaries), **(tables or {})}
     source = "Stability atlas: no published cells; boundaries by bisection on our own runs"
-    return Result(name, title, source, cells, list(figures), [*sentences, *notes], [], tables)
+    return Result(name, title, source, cells, list(figures), [*sentences, *_unbroken(boundaries), *notes], [], tables)
 
 
 def _cells(boundary: Boundary) -> list[Cell]:
@@ -156,10 +156,17 @@ def _cells(boundary: Boundary) -> list[Cell]:
 
 def _sentence(boundary: Boundary) -> str:
     """What goes wrong and what the cure costs, for the page."""
-    at = boundary.holds if boundary.breaks is None else boundary.breaks
-    where = f"{boundary.parameter} {at:.4g} {boundary.unit}".rstrip()
-    if boundary.breaks is None:
-        return f"{boundary.method}: never breaks up to {where}."
+    where = f"{boundary.parameter} {boundary.breaks:.4g} {boundary.unit}".rstrip()
     cure = f" Cure: {boundary.cure}" if boundary.cure else ""
     cost = f" ({boundary.cost})" if boundary.cost else ""
     return f"{boundary.method}: from {where}, {boundary.wrong}.{cure}{cost}{'.' if cure else ''}"
+
+
+def _unbroken(boundaries: Sequence[Boundary]) -> list[str]:
+    """A sentence for each range in which something never breaks."""
+    methods: dict[str, list[str]] = {}
+    for boundary in boundaries:
+        if boundary.breaks is None:
+            where = f"{boundary.parameter} {boundary.holds:.4g} {boundary.unit}".rstrip()
+            methods.setdefault(where, []).append(boundary.method)
+    return [f"Never breaks up to {where}: {'; '.join(names)}." for where, names in methods.items()]

@@ -20,7 +20,7 @@ from simulator.stages.eisenacher2010.tile_range import screen_tiles
 from simulator.stages.eisenacher2010.tile_raster import tile_raster
 from simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, new_setup, set_up
 from simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
-from simulator.stages.zhang2025.fine_rasterizer import coverage
+from simulator.stages.zhang2025.fine_tile import coverage
 
 MACHINE = "h200"
 STEPS = 65536  # a pixel
