@@ -66,16 +66,11 @@ def set_up(corners, edges, owns, expansion):
 
 
 @njit(cache=True, nogil=True)
-def _covers(corners, edges, owns, sign, x, y, values, expansion):
-    """Whether the triangle covers a sample; ``values`` takes its edge functions there."""
+def _owns_closely(corners, owns, sign, x, y, a, b, c, near, expansion):
+    """Whether a sample is covered that is inside, or on one of the three edges as far as ``near`` can tell."""
     for k in range(3):
-        edge = edges[k]
-        value = edge[0] * x + edge[1] * y + edge[2]
-        values[k] = value
-        bound = edge[3] * abs(x) + edge[4] * abs(y) + edge[5]
-        if value < -bound:
-            return False
-        if value <= bound:
+        value = a if k == 0 else b if k == 1 else c
+        if value <= near[k]:
             exact = sign * edge_sign(corners[(k + 1) % 3], corners[(k + 2) % 3], x, y, 1.0, expansion)
             if exact < 0 or (exact == 0 and not owns[k]):
                 return False
@@ -83,13 +78,13 @@ def _covers(corners, edges, owns, sign, x, y, values, expansion):
 
 
 @njit(cache=True, nogil=True)
-def _span(corners, axis, first, step, count):
+def _span(triangle, axis, first, step, count):
     """First and last grid line that a triangle can touch, or one more; all where it crosses the eye's plane."""
     low, high = np.inf, -np.inf
     for k in range(3):
-        if corners[k, 2] <= 0.0:
+        if triangle[k, 2] <= 0.0:
             return 0, count - 1
-        at = (corners[k, axis] / corners[k, 2] - first) / step
+        at = (triangle[k, axis] / triangle[k, 2] - first) / step
         low, high = min(low, at), max(high, at)
     if not (low <= high) or high < -1.0 or low > count:
         return 0, -1
@@ -97,13 +92,29 @@ def _span(corners, axis, first, step, count):
 
 
 @njit(cache=True, nogil=True)
-def draw(corners, depths, cull, grid, first_row, end_row, visible):
-    """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; ``visible`` holds only those."""
-    ids, depth, hits = visible
-    edges, owns, values = np.empty((3, 6)), np.empty(3, np.bool_), np.empty(3)
-    expansion = np.empty(COMPONENTS)
+def _weights(triangle, depths, t, sign, weights):
+    """Factors of the edge functions in z / w: at a sample w is 1, so weights that add up to the determinant do it."""
+    det = 0.0
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        det += triangle[0, k] * (triangle[1, i] * triangle[2, j] - triangle[1, j] * triangle[2, i])
+    for k in range(3):
+        weights[k] = depths[t, k] / (sign * det) if det != 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
+    """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; the arrays hold only those.
+
+    Scratch is private, and no view of a shared array is made for a sample: counting its references would make threads
+    wait for one another.
+    """
+    triangle, edges, owns = np.empty((3, 3)), np.empty((3, 6)), np.empty(3, np.bool_)
+    at_row, near, weights, expansion = np.empty(3), np.empty(3), np.empty(3), np.empty(COMPONENTS)
     for t in range(corners.shape[0]):
-        triangle = corners[t]
+        for k in range(3):
+            for c in range(3):
+                triangle[k, c] = corners[t, k, c]
         top, bottom = _span(triangle, 1, grid.y, grid.dy, grid.rows)
         if bottom < first_row or top >= end_row:
             continue
@@ -113,32 +124,35 @@ def draw(corners, depths, cull, grid, first_row, end_row, visible):
         sign = set_up(triangle, edges, owns, expansion)
         if sign == 0 or (cull and sign > 0):  # with y down, counter-clockwise is negative
             continue
+        _weights(triangle, depths, t, sign, weights)
+        right_a, right_b, right_c = edges[0, 0], edges[1, 0], edges[2, 0]
+        reach = max(abs(grid.x + left * grid.dx), abs(grid.x + right * grid.dx))
         for j in range(max(top, first_row), min(bottom + 1, end_row)):
             y, row = grid.y + j * grid.dy, j - first_row
+            for k in range(3):
+                at_row[k] = edges[k, 1] * y + edges[k, 2]
+                near[k] = edges[k, 3] * reach + edges[k, 4] * abs(y) + edges[k, 5]
+            row_a, row_b, row_c, near_a, near_b, near_c = at_row[0], at_row[1], at_row[2], near[0], near[1], near[2]
             for i in range(left, right + 1):
                 x = grid.x + i * grid.dx
-                if not _covers(triangle, edges, owns, sign, x, y, values, expansion):
+                a, b, c = right_a * x + row_a, right_b * x + row_b, right_c * x + row_c
+                if a < -near_a or b < -near_b or c < -near_c:
                     continue
-                z = depth_of(triangle, depths[t], values, sign)
-                if not -1.0 <= z <= 1.0:
+                if (a <= near_a or b <= near_b or c <= near_c) and not _owns_closely(
+                    triangle, owns, sign, x, y, a, b, c, near, expansion
+                ):
                     continue
-                hits[row, i] += 1
-                if z < depth[row, i]:
-                    depth[row, i], ids[row, i] = z, t
-
-
-@njit(cache=True, nogil=True)
-def depth_of(triangle, depths, values, sign):
-    """Depth at a sample from its edge functions: there w is 1, so weights that sum to det give z over w."""
-    a, b, c = triangle[0], triangle[1], triangle[2]
-    det = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-    return (values[0] * depths[0] + values[1] * depths[1] + values[2] * depths[2]) / (sign * det)
+                z = a * weights[0] + b * weights[1] + c * weights[2]
+                if -1.0 <= z <= 1.0:
+                    hits[row, i] += 1
+                    if z < depth[row, i]:
+                        depth[row, i], ids[row, i] = z, t
 
 
 @njit(cache=True, nogil=True)
 def _draw_part(part, parts, corners, depths, cull, grid, ids, depth, hits):
     first, end = grid.rows * part // parts, grid.rows * (part + 1) // parts
-    draw(corners, depths, cull, grid, first, end, (ids[first:end], depth[first:end], hits[first:end]))
+    draw(corners, depths, cull, grid, first, end, ids[first:end], depth[first:end], hits[first:end])
 
 
 def exact_coverage(

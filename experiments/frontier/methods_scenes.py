@@ -1,0 +1,118 @@
+"""Scenes of the frontier of the methods: two waving sheets that cut through one another, of triangles of one area."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.scenes.clip_space import clip_space_scene
+from simulator.scenes.library import load_scene
+from simulator.scenes.scene import Mesh, Scene
+from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+
+SHEETS = ((17.0, 1.0, (0.95, 0.55, 0.25)), (-38.0, -1.0, (0.25, 0.55, 0.95)))  # degrees, sign of the wave, colour
+JITTER = 0.18  # of a leg of a triangle, by which its corners are moved
+RELIEF = 0.05  # depth of the waves, of the range -1 to 1
+TEXELS = 64  # along the texture
+
+
+def sheets(area: float, width: int, height: int, *, count: int = 2, seed: int = 7) -> Scene:
+    """Two sheets that cover the screen, each a partition of it into right triangles moved a little.
+
+    Parameters
+    ----------
+    area : float
+        Mean pixels a triangle.
+    width, height : int
+        Pixels.
+    count : int
+        1 for a single sheet, which covers every sample exactly once.
+    seed : int
+    """
+    random = np.random.default_rng(seed)
+    parts = [_sheet(area, width, height, *SHEETS[k], random) for k in range(count)]
+    first = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
+    positions, colors = (np.concatenate([part[k] for part in parts]).astype(np.float32) for k in (0, 1))
+    triangles = np.concatenate([part[2] + start for part, start in zip(parts, first, strict=True)])
+    return _scene(f"sheets of {area:g} px", positions, triangles.astype(np.int32), colors)
+
+
+def textured(area: float, width: int, height: int) -> Scene:
+    """One sheet with a texture that the screen magnifies on one side and minifies on the other."""
+    scene = sheets(area, width, height, count=1)
+    assert scene.mesh is not None  # noqa: S101 - made just so
+    mesh = scene.mesh
+    x = 0.5 + 0.5 * mesh.positions[:, 0] / mesh.positions[:, 3]
+    y = 0.5 - 0.5 * mesh.positions[:, 1] / mesh.positions[:, 3]
+    uvs = np.stack([6.0 * x**2, 3.0 * y**2], axis=1).astype(np.float32)
+    ids = np.zeros(len(mesh.triangles), np.int32)
+    white = np.ones_like(mesh.colors)
+    return _scene(f"textured sheet of {area:g} px", mesh.positions, mesh.triangles, white, uvs, ids, (_checker(),))
+
+
+def real(name: str, width: int, height: int) -> Scene:
+    """A model in clip space, as float32 vertices that every pipeline gets alike, and with its vertices' colours."""
+    scene = load_scene(name)
+    matrix = scene.views["default"].matrix(width, height)
+    mesh = triangle_mesh(scene)
+    return _scene(name, clip_positions(mesh, matrix), mesh.triangles, vertex_colors(mesh, matrix))
+
+
+def _sheet(
+    area: float,
+    width: int,
+    height: int,
+    degrees: float,
+    sign: float,
+    color: tuple[float, float, float],
+    random: np.random.Generator,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Clip positions, colours and triangles of one sheet, drawn a triangle beyond the screen."""
+    leg = np.sqrt(2.0 * area)
+    turn = np.radians(degrees)
+    rotate = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    half = np.ceil(np.hypot(width, height) / (2.0 * leg)) + 1
+    steps = np.arange(-half, half + 1)
+    x, y = np.meshgrid(steps, steps)
+    grid = np.stack([x, y], axis=-1) + random.uniform(-JITTER, JITTER, (*x.shape, 2))
+    pixels = grid @ rotate.T * leg  # from the middle of the screen
+    u, v = pixels[..., 0] / width * 2.0, pixels[..., 1] / height * 2.0
+    w = 1.5 + 0.4 * np.sin(1.7 * u + sign) + 0.2 * v
+    z = RELIEF * sign * np.sin(5.0 * u + 2.0 * v) + 0.3 * RELIEF * np.cos(7.0 * v - u)
+    clip = np.stack([u * w, v * w, z * w, w], axis=-1).reshape(-1, 4)
+    light = 0.55 + 0.3 * np.cos(9.0 * u) * np.cos(9.0 * v) + random.uniform(-0.15, 0.15, u.shape)
+    colors = np.concatenate([light[..., None] * np.array(color), np.ones((*u.shape, 1))], axis=-1).reshape(-1, 4)
+    triangles = _grid_triangles(len(steps))
+    near = np.abs(pixels.reshape(-1, 2)) <= np.array([width, height]) / 2.0 + 2.0 * leg
+    kept = near.all(axis=1)[triangles].all(axis=1)
+    return clip, np.clip(colors, 0.0, 1.0), triangles[kept]
+
+
+def _grid_triangles(side: int) -> NDArray[np.int64]:
+    """Two counter-clockwise triangles for each cell of a grid of side x side vertices, row by row."""
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + side, corner + side + 1
+    return np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3)
+
+
+def _scene(
+    name: str,
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    colors: NDArray[np.float32],
+    uvs: NDArray[np.float32] | None = None,
+    texture_ids: NDArray[np.int32] | None = None,
+    textures: tuple[NDArray[np.uint8], ...] = (),
+) -> Scene:
+    """A clip-space scene whose normals face the eye, so that pipelines that light it leave its colours as they are."""
+    normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(positions), 1))
+    mesh = Mesh(positions, triangles, colors, normals, True, uvs, texture_ids, textures)
+    return clip_space_scene(mesh, name)
+
+
+def _checker() -> NDArray[np.uint8]:
+    """Coloured squares with thin lines between them, RGBA."""
+    i, j = np.meshgrid(np.arange(TEXELS), np.arange(TEXELS), indexing="ij")
+    square = (i // 8 + j // 8) % 2 == 0
+    texture = np.full((TEXELS, TEXELS, 4), 255, np.uint8)
+    texture[..., :3] = np.where(square[..., None], (240, 220, 180), (60, 90, 150))
+    texture[(i % 8 == 0) | (j % 8 == 0), :3] = (20, 20, 20)
+    return texture
