@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MARKERS = "os^vP*Xd"
+MOST_NAMES = 18
+NAME_WIDTH, NAME_HEIGHT = 0.25, 0.035  # of the axes
 
 
 def frontier(
@@ -36,7 +38,7 @@ def frontier(
     xlabel, ylabel, title : str
         With units.
     label : bool
-        Write the names of the points: those on the front and the published ones, or all where there is no front.
+        Write the names of the points; of many, those on the front and the published ones.
     guide : float, optional
         An error to mark by a dotted line, as an aim.
     """
@@ -49,6 +51,7 @@ def frontier(
         for index, (group, rows) in enumerate(shown.groupby("group", sort=False)):
             color, marker = PALETTE[index % len(PALETTE)], MARKERS[index % len(MARKERS)]
             for published, part in rows.groupby("published"):
+                mixed = published and not rows["published"].all()
                 axes.plot(
                     part["cost"],
                     part["height"],
@@ -57,14 +60,15 @@ def frontier(
                     markersize=6,
                     color=color,
                     markerfacecolor="none" if published else color,
-                    label=f"{group} (published)" if published else str(group),
+                    label=f"{group} (published)" if mixed else str(group),
                 )
         if "front" in shown:
             _steps(axes, shown[shown["front"]])
         if guide is not None:
             axes.axhline(guide, color="#999999", linestyle=":", linewidth=1.2)
         axes.set(xlabel=xlabel, ylabel=ylabel, xscale="log", yscale="log")
-        axes.margins(x=0.12, y=0.1)
+        axes.margins(x=0.15, y=0.1)
+        _ticks(axes)
         if none.any():
             axes.annotate("no error", (0.005, foot), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
         if label:
@@ -72,21 +76,37 @@ def frontier(
         axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
+def _ticks(axes: Any) -> None:
+    """Plain numbers at the decades, and at 2 and 5 where there are few decades."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        decades = np.log10(high / low)
+        steps = (1.0,) if decades > 3 else (1.0, 2.0, 5.0) if decades > 0.7 else tuple(np.arange(1.0, 10.0, 0.5))
+        axis.set_major_locator(LogLocator(subs=steps))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
+
+
 def _steps(axes: Any, front: "pd.DataFrame") -> None:
     """Draw the front from the cheapest to the most exact point."""
     rows = front.sort_values(["cost", "height"])
-    axes.step(  # type: ignore[attr-defined]  # matplotlib's Axes
-        rows["cost"],
-        rows["height"],
-        where="post",
-        color="black",
-        linewidth=1.0,
-        label="front: nothing beats it in both",
-    )
+    label = "front: nothing beats it in both"
+    axes.step(rows["cost"], rows["height"], where="post", color="black", linewidth=1.0, label=label)
 
 
 def _label(axes: Any, shown: "pd.DataFrame") -> None:
-    """Write names beside their points, each name once a place."""
-    named = shown[shown["front"] | shown["published"].astype(bool)] if "front" in shown else shown
-    for point in named.drop_duplicates(["name", "cost", "height"]).itertuples():
-        axes.annotate(point.name, (point.cost, point.height), xytext=(5, 4), textcoords="offset points", fontsize=7)
+    """Write names beside their points, below where the next one to the left is as high; too many are left out."""
+    named = shown.drop_duplicates(["name", "cost", "height"]).sort_values("cost")
+    if len(named) > MOST_NAMES and "front" in named:
+        named = named[named["front"] | named["published"].astype(bool)]
+    placed: list[tuple[float, float]] = []
+    for point in named.itertuples():
+        x, y = axes.transAxes.inverted().transform(axes.transData.transform((point.cost, point.height)))
+        crowded = any(0 <= x - left < NAME_WIDTH and abs(y - other) < NAME_HEIGHT for left, other in placed)
+        y = y - NAME_HEIGHT if crowded else y
+        placed.append((x, y))
+        offset, side = ((5, -4), "top") if crowded else ((5, 3), "bottom")
+        axes.annotate(
+            point.name, (point.cost, point.height), xytext=offset, textcoords="offset points", fontsize=7, va=side
+        )

@@ -1,0 +1,197 @@
+"""Frontier of the model itself: what each fidelity and sampling rate costs, and how far its answer is off.
+
+Set TILESTAMP_FRONTIER=long for more frames, rates and seeds (minutes).
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from experiments.frontier.model_frames import Timed, frames, is_long, warnings
+from experiments.frontier.model_notes import AUTO, BOUNDS, FULL, notes
+from experiments.frontier.pareto import pareto_front
+from experiments.published import published
+from experiments.registry import Progress
+from experiments.result import Cell, Figure, Result
+from models.events import INSTRUCTION_CLASSES
+from models.launch import Launch
+from models.price import Fidelity
+from reports.frontier_plot import frontier
+from simulator.run import Run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+SOURCE = (
+    "Clock: this computer. Times of frames: Eisenacher & Loop 2010, Laine & Karras 2011, an H200. Other simulators: as "
+    "published (detailed_simulators.csv names each source)"
+)
+FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "auto": AUTO}
+RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
+SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
+REPEATS = 3  # of pricing, which takes milliseconds
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One simulation of one frame: its cost and what it said."""
+
+    method: str
+    cpu_seconds: float
+    pricing_seconds: float  # of them
+    milliseconds: float
+    instructions: float
+    played: str = ""  # launches that auto escalated, of all
+
+
+def run(progress: Progress) -> Result:
+    """Simulate every frame in every way, against the clock."""
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    for frame in frames():
+        progress(f"frontier/model: {frame.name}")
+        rows += _rows(frame, _answers(frame))
+    table = pd.DataFrame(rows)
+    ours = _by_method(table)
+    theirs = _detailed(table[table.method == FULL].instructions.mean())
+    count = table.frame.nunique()
+    return Result(
+        "frontier-model",
+        "What accuracy costs: the simulation's own time against the error of its answer",
+        SOURCE,
+        _cells(ours, theirs),
+        [
+            Figure("against-full-run", lambda path: _draw_full(ours, count, path)),
+            Figure("against-published", lambda path: _draw_published(ours, theirs, count, path)),
+        ],
+        notes(table, ours, theirs, _beside(ours, theirs)),
+        warnings(),
+        {"frames": table, "methods": ours, "detailed-simulators": theirs},
+    )
+
+
+def _answers(frame: Timed) -> list[Answer]:
+    """Execute in full and price at each fidelity; execute samples and price them. The full one comes first."""
+    frame.warm_up(RATES[0])
+    answers = []
+    drawn, seconds = _timed(frame.simulate)
+    for fidelity, method in FIDELITIES.items():
+        answers.append(_priced(frame, drawn, fidelity, method, seconds))
+    for rate in RATES_LONG if is_long() else RATES:
+        for seed in SEEDS_LONG if is_long() else SEEDS:
+            drawn, seconds = _timed(frame.simulate, error=rate, seed=seed)
+            answers.append(_priced(frame, drawn, "schedule", f"schedule, sampled to {rate:.0%}", seconds))
+    return answers
+
+
+def _timed(act: Callable[..., Run], **options: Any) -> tuple[Run, float]:
+    """Do it; CPU seconds of all threads."""
+    start = time.process_time()
+    made = act(**options)
+    return made, time.process_time() - start
+
+
+def _priced(frame: Timed, drawn: Run, fidelity: Fidelity, method: str, seconds: float) -> Answer:
+    """Price an execution; the quickest of some times counts."""
+    quickest = float("inf")
+    for _ in range(REPEATS):
+        start = time.process_time()
+        run = drawn.on(drawn.machine, fidelity)
+        milliseconds = frame.milliseconds_of(run)
+        quickest = min(quickest, time.process_time() - start)
+    played = sum(t.fidelity == "schedule" for t in run.timings)
+    warps = [launch.events[:, list(INSTRUCTION_CLASSES)].sum() for launch in run.launches if isinstance(launch, Launch)]
+    return Answer(
+        method, seconds + quickest, quickest, milliseconds, float(sum(warps)), f"{played} of {len(run.timings)}"
+    )
+
+
+def _rows(frame: Timed, answers: list[Answer]) -> list[dict[str, Any]]:
+    """Each answer beside the full one and what is known."""
+    full = answers[0].milliseconds
+    return [
+        {
+            "frame": frame.name,
+            **asdict(answer),
+            "known_ms": frame.known_ms,
+            "known": frame.kind,
+            "error_against_full": abs(answer.milliseconds / full - 1.0),
+            "error_against_known": abs(answer.milliseconds / frame.known_ms - 1.0),
+        }
+        for answer in answers
+    ]
+
+
+def _by_method(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Mean over the frames: seeds first, so that every frame counts once."""
+    frames_ = table.groupby(["method", "frame"], sort=False).mean(numeric_only=True)
+    mean = frames_.groupby("method", sort=False).mean()
+    worst = frames_.groupby("method", sort=False).max()
+    return mean.assign(worst_against_full=worst.error_against_full).reset_index()
+
+
+def _detailed(instructions: float) -> "pd.DataFrame":
+    """Simulators by others: their published error, and the seconds that their speed means for the mean frame."""
+    table = published(__file__, "detailed_simulators")
+    return table.assign(seconds=instructions / table.warp_instructions_per_second)
+
+
+def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
+    """What is drawn, as numbers."""
+    shown = {
+        "time to simulate a frame": ("cpu_seconds", "CPU s", 1),
+        "mean error against the full run": ("error_against_full", "%", 100),
+        "mean error against known times": ("error_against_known", "%", 100),
+    }
+    cells = [
+        Cell(row["method"], column, unit, None, scale * row[name], "reported")
+        for row in ours.to_dict("records")
+        for column, (name, unit, scale) in shown.items()
+    ]
+    for row in theirs[theirs.seconds.notna()].to_dict("records"):
+        speed = str(row["speed_mark"]).partition(":")[0]
+        cells.append(Cell(row["name"], f"the same at its {speed} speed", "CPU s", None, row["seconds"], "reported"))
+    return cells
+
+
+def _points(ours: "pd.DataFrame", column: str) -> "pd.DataFrame":
+    import pandas as pd
+
+    group = ["ours, sampled" if "sampled" in name else "ours, all units executed" for name in ours.method]
+    points = {"name": ours.method, "group": group, "cost": ours.cpu_seconds, "error": 100 * ours[column]}
+    return pd.DataFrame({**points, "published": False})
+
+
+def _draw_full(ours: "pd.DataFrame", frames_: int, path: "Path") -> None:
+    points = _points(ours, "error_against_full")
+    points["front"] = pareto_front(points.cost, points.error)
+    title = f"Cost of a simulation against its distance from the full one, mean of {frames_} frames"
+    frontier(path, points, "time to simulate one frame [CPU s]", "mean error of the frame's time [%]", title)
+
+
+def _draw_published(ours: "pd.DataFrame", theirs: "pd.DataFrame", frames_: int, path: "Path") -> None:
+    frontier(
+        path,
+        _beside(ours, theirs),
+        "time to simulate one frame [CPU s]",
+        "mean error of a frame's time against silicon [%]",
+        f"Cost of a simulation against its error on published and measured times, mean of {frames_} frames",
+    )
+
+
+def _beside(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> "pd.DataFrame":
+    """Our methods and the simulators by others, with the front over both."""
+    import pandas as pd
+
+    drawn = theirs[theirs.seconds.notna()]
+    group = [
+        "others, error and speed published" if mark == "published" else "others, speed derived"
+        for mark in drawn.speed_mark
+    ]
+    others = {"name": drawn.name, "group": group, "cost": drawn.seconds, "error": drawn.error_percent}
+    points = pd.concat([_points(ours, "error_against_known"), pd.DataFrame({**others, "published": True})])
+    return points.assign(front=pareto_front(points.cost, points.error))

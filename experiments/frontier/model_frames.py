@@ -1,0 +1,139 @@
+"""Frames whose time is known: what the frontier of the model is measured on."""
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from experiments.eisenacher2010.frames import model, overhead_ms, stand_in_warnings
+from experiments.laine2011 import sweep
+from experiments.published import published
+from experiments.silicon.h200 import folder
+from models.errors import TilestampError
+from simulator.run import Run
+from simulator.scenes import Scene, load_scene
+from simulator.simulation import simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+VARIABLE = "TILESTAMP_FRONTIER"  # "long" for the long grid
+EISENACHER = (("teapot", 512), ("killeroo", 512), ("killeroo", 1600))
+EISENACHER_LONG = tuple((name, width) for name in ("teapot", "bigguy", "killeroo") for width in (512, 1600))
+AREAS, AREAS_LONG = (0.5,), (0.5, 4.0, 16.0)  # pixels a triangle, none of them fitted
+H200, H200_LONG = ("teapot_1600x1200_bb4",), ("teapot_1600x1200_bb4", "teapot_1600x1200_bb8", "bigguy_512x512_bb4")
+TILE = 8
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A frame, how to simulate it, and how long it took elsewhere.
+
+    Parameters
+    ----------
+    name : str
+    scene, pipeline, machine, arguments
+        Of ``simulator.simulate``.
+    milliseconds_of : callable
+        What is compared, of a run.
+    known_ms : float
+        Published or measured.
+    kind : {"published", "measured"}
+    """
+
+    name: str
+    scene: Scene
+    pipeline: str
+    machine: str
+    arguments: dict[str, Any]
+    milliseconds_of: Callable[[Run], float]
+    known_ms: float
+    kind: str
+
+    def simulate(self, **more: Any) -> Run:
+        """Execute it, without a picture."""
+        return simulate(self.scene, self.pipeline, self.machine, picture=False, **self.arguments, **more)
+
+    def warm_up(self, error: float) -> None:
+        """Compile its kernels, in full and sampled, on a small frame."""
+        small = self.arguments | {"width": 64, "height": 48, "camera": None}
+        for asked in (0.0, error):
+            run = simulate("teapot", self.pipeline, self.machine, picture=False, **small, error=asked)
+            for fidelity in ("auto", "schedule"):
+                self.milliseconds_of(run.on(run.machine, fidelity))
+
+
+def is_long() -> bool:
+    """Whether the long grid is asked for."""
+    return os.environ.get(VARIABLE, "") == "long"
+
+
+def frames() -> list[Timed]:
+    """Frames of the grid asked for."""
+    return [*_eisenacher(), *_laine(), *_h200()]
+
+
+def warnings() -> list[str]:
+    """Say which frames are of stand-ins or missing."""
+    chosen = EISENACHER_LONG if is_long() else EISENACHER
+    said = stand_in_warnings(*dict.fromkeys(name for name, _ in chosen))
+    return said if list(_h200()) else [*said, "No measurements of an H200 at hand: its kernels are left out."]
+
+
+def _eisenacher() -> Iterator[Timed]:
+    """Table 2 of Eisenacher & Loop, bounding box 4, 1 sample a pixel."""
+    table = published(str(Path(sweep.__file__).parents[1] / "eisenacher2010" / "table2"), "table2")
+    for name, width in EISENACHER_LONG if is_long() else EISENACHER:
+        row = table[(table.model == name) & (table.width == width) & (table.bounding_box == 4)].iloc[0]
+        options = {"width": width, "height": int(row.height), "tile": TILE, "bound": 4, "bound_rule": "pixel_extent"}
+        about = f"{name} {width}x{row.height}, GTX 280"
+        known = float(row.ms_1spp)
+        yield Timed(about, model(name), "micropolygon", "gtx280", options, _with_overhead, known, "published")
+
+
+def _with_overhead(run: Run) -> float:
+    return run.milliseconds + overhead_ms(run)
+
+
+def _laine() -> Iterator[Timed]:
+    """Some areas of Figure 5 of Laine & Karras."""
+    for area in AREAS_LONG if is_long() else AREAS:
+        scene = Scene.sweep(area, sweep.WIDTH, sweep.HEIGHT)
+        assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
+        known = sum(sweep.published_ns()[area, stage] for stage in sweep.STAGES) * len(scene.mesh.triangles) * 1e-6
+        options = {"width": sweep.WIDTH, "height": sweep.HEIGHT, "camera": np.eye(4), "mode": "color"}
+        about = f"sweep {area:g} px, GTX 480"
+        yield Timed(about, scene, "cudaraster", sweep.MACHINE, options, _stages(*sweep.STAGES), known, "published")
+
+
+def _h200() -> Iterator[Timed]:
+    """The tile raster of some scenes, as it was measured on an H200."""
+    import pandas as pd
+
+    try:
+        stored = folder()
+    except TilestampError:
+        return
+    table = pd.read_csv(stored / "micropolygon.csv")
+    cameras = json.loads((stored / "micropolygon_cameras.json").read_text("utf-8"))
+    for scene in H200_LONG if is_long() else H200:
+        camera = cameras[scene]
+        options = {"width": camera["width"], "height": camera["height"], "camera": np.array(camera["model_to_clip"])}
+        options |= {"tile": TILE, "bound": camera["bound_pixels"]}
+        about, known = f"{scene}, tile raster, H200", _measured(table, scene)
+        shown = load_scene(camera["model"])
+        yield Timed(about, shown, "micropolygon", "h200", options, _stages("tile_raster"), known, "measured")
+
+
+def _measured(table: "pd.DataFrame", scene: str) -> float:
+    """Milliseconds of the tile raster at one sample a pixel."""
+    is_it = (table.scene == scene) & (table.tile == TILE) & (table.spp == 1) & (table.kernel == "k_raster")
+    return float(table[is_it & (table.metric == "cupti_us_median") & (table.source == "cupti")].value.iloc[0]) * 1e-3
+
+
+def _stages(*names: str) -> Callable[[Run], float]:
+    return lambda run: sum(t.milliseconds for t in run.timings if t.stage in names)
