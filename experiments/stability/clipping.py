@@ -57,7 +57,7 @@ def run(progress: Callable[[str], None]) -> Result:
             ]
             found = boundary(name, case, bracket(case.steps, [share > WRONG for share in swept]))
             wrong_words, cure = case.words[WITHOUT_CLIPPING.get(name, 0)]
-            cost = costs[0] if cure == CLIP else ""
+            cost = costs[0].rstrip(".") if cure == CLIP else ""
             boundaries.append(Boundary(name, f"{title}: {case.parameter}", case.unit, *found, wrong_words, cure, cost))
     table = pd.DataFrame(rows)
     figure = Figure("clipping", lambda path: _plot(table, path))

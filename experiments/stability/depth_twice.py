@@ -1,0 +1,159 @@
+"""One-pixel holes: a depth that is evaluated twice, rounded otherwise the second time, and compared as an integer.
+
+Zhang (2025, "Limitation & Failure Case") reports holes of one pixel in release builds and suspects the conversion of
+float depth to unsigned. Early z puts the least integer depth of a pixel into the depth buffer; the fragment's depth is
+evaluated again for the ROP, which drops what is greater than the buffer. We take one evaluation with multiplications
+and additions rounded one by one, the other with a multiplication and an addition contracted, as a compiler may do in
+an optimized build (assumed): where the second comes out a step farther, the pixel keeps no fragment at all.
+
+The public source of the original subtracts 0.0001 in the second evaluation: a slack. What it costs is order: surfaces
+closer than the slack are drawn in the order of their triangles.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numba import njit
+from numpy.typing import NDArray
+
+from experiments.result import Figure, Result
+from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from experiments.stability.methods import MACHINE
+from models.machine import load_machine
+from reports.plots import lines
+from simulator.stages.laine2011.exact import fma
+from simulator.stages.zhang2025.depth import DEPTH_STEPS, depth_24_bit
+from simulator.stages.zhang2025.triangle_setup import evaluate
+
+SIZE = 64  # pixels
+PLANES = 16  # directions in which the plane rises
+RANGES = tuple(2.0**-k for k in range(24, 0, -1))  # depth across the screen, of a depth range of 1
+MIDDLES = (0.03, 0.06, 0.12, 0.25, 0.5, 0.74)  # depth of the screen's middle
+MIDDLE = 0.74  # where perspective puts most of a scene: far
+PUBLISHED_SLACK = 1e-4  # of the depth range, in the original's source
+PUBLISHED_STEPS = round(PUBLISHED_SLACK * float(DEPTH_STEPS))
+TILT = 0.05  # depth across the screen of the pair of planes
+FULL_HD = 1920 * 1080
+WORD = 4  # bytes
+_HALF = np.float32(0.5)
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Tilt a plane at several depths; find the tilt of the first hole, and the slack that closes all."""
+    progress("depth evaluated twice")
+    rows = [{"middle": middle, "range": reach, "holes": holes(reach, middle)} for middle in MIDDLES for reach in RANGES]
+    table = pd.DataFrame(rows)
+    slacks = [needed_slack(reach) for reach in RANGES]
+    swept = [bool(n) for n in table[table.middle == MIDDLE].holes]
+    tilt = Boundary(
+        "binned, depth evaluated twice", "depth across the screen", "of the range", *boundary(swept),
+        f"single pixels stay empty, at most {table.holes.max():.2%} of a plane's",
+        f"a slack of {max(slacks)} step of 24 bits", "what a slack costs is order, see the next rows",
+    )  # fmt: skip
+    orders = [_order(slack, name) for slack, name in ((0, ""), (max(slacks), ""), (PUBLISHED_STEPS, ", as published"))]
+    figure = Figure("holes", lambda path: _plot(table, path))
+    title = "One-pixel holes from integer depth"
+    return atlas_result(
+        "stability/depth_twice", title, [tilt, *orders], [figure], _notes(table, slacks), {"holes": table}
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _evaluate_twice(plane: Any, first: Any, second: Any) -> None:
+    """Integer depths (H, W) of a plane over the pixels: as early z has them, and with a contracted multiply-add."""
+    for y in range(first.shape[0]):
+        for x in range(first.shape[1]):
+            px, py = np.float32(x) + _HALF, np.float32(y) + _HALF
+            first[y, x] = depth_24_bit(evaluate(plane, px, py))
+            second[y, x] = depth_24_bit(fma(plane[0], px, plane[1] * py) + plane[2])
+
+
+def twice(reach: float, middle: float) -> NDArray[np.int64]:
+    """Steps by which the second evaluation lies farther, (PLANES, SIZE, SIZE); negative is nearer."""
+    rng = np.random.default_rng(5)
+    depth = np.zeros((2, PLANES, SIZE, SIZE), np.int64)
+    for k, angle in enumerate(rng.random(PLANES) * 2 * np.pi):
+        slope = reach / SIZE * np.array([np.cos(angle), np.sin(angle)]) / np.abs([np.cos(angle), np.sin(angle)]).sum()
+        plane = np.array([*slope, middle - slope.sum() * SIZE / 2], np.float32)
+        _evaluate_twice(plane, depth[0, k], depth[1, k])
+    later: NDArray[np.int64] = depth[1] - depth[0]
+    return later
+
+
+def holes(reach: float, middle: float = MIDDLE, slack: int = 0) -> float:
+    """Share of the pixels that lose their only fragment."""
+    return float((twice(reach, middle) > slack).mean())
+
+
+def needed_slack(reach: float) -> int:
+    """Least slack, in steps, that closes every hole at any depth tried."""
+    return int(max(twice(reach, middle).max() for middle in MIDDLES))
+
+
+def boundary(swept: list[bool] | None = None) -> tuple[float | None, float | None]:
+    """Depth across the screen without and with a hole."""
+    swept = [holes(reach) > 0 for reach in RANGES] if swept is None else swept
+    return bisect(lambda reach: holes(reach) > 0, *bracket(RANGES, swept), tolerance=0.05)
+
+
+def loses_order(separation: float, slack: int) -> bool:
+    """Whether a farther plane, drawn later, passes the depth test somewhere against a nearer one."""
+    near, far = np.empty((2, SIZE, SIZE), np.int64), np.empty((2, SIZE, SIZE), np.int64)
+    slope = TILT / SIZE / 2
+    for depth, middle in ((near, MIDDLE), (far, MIDDLE + separation)):
+        _evaluate_twice(np.array([slope, slope, middle - slope * SIZE], np.float32), *depth)
+    return bool((far[1] - slack <= near[0]).any())
+
+
+def order_boundary(slack: int) -> tuple[float | None, float | None]:
+    """Separation that keeps the order and separation that loses it."""
+    return bisect(lambda separation: loses_order(separation, slack), 0.1, 1e-9, tolerance=0.02)
+
+
+def _order(slack: int, name: str) -> Boundary:
+    """A row of the atlas: what a slack costs."""
+    return Boundary(
+        f"binned, slack of {slack} steps{name}", "separation of surfaces", "of the range", *order_boundary(slack),
+        "the surface behind is drawn where its triangle comes later",
+        "the first depth carried along, and no slack" if slack else "more bits", _carrying_cost() if slack else "",
+    )  # fmt: skip
+
+
+def _carrying_cost() -> str:
+    """Price a word more in each fragment, written once and read once."""
+    memory = load_machine(MACHINE).memory
+    milliseconds = 2 * WORD * FULL_HD / (memory.dram_gb_per_s * memory.dram_efficiency * 1e6)
+    return f"a word a fragment more is {milliseconds:.4f} ms of the {MACHINE}'s bandwidth for a screen of 1920 x 1080"
+
+
+def _notes(table: pd.DataFrame, slacks: list[int]) -> list[str]:
+    """Compare depths and tilts."""
+    at = table[table.range == RANGES[-1]].set_index("middle").holes
+    lost = (
+        f"A plane that spans {RANGES[-1]:g} of the depth range across {SIZE} x {SIZE} pixels loses"
+        f" {at.min():.2%} to {at.max():.2%} of its pixels, by the depth of its middle ({at.idxmin():g} and"
+        f" {at.idxmax():g}); {PLANES} directions each."
+    )
+    needed = (
+        f"The second depth lies at most {max(slacks)} step of 24 bits behind the first; the original's slack of"
+        f" {PUBLISHED_SLACK:g} is {PUBLISHED_STEPS} steps."
+    )
+    return [lost, needed]
+
+
+def _plot(table: pd.DataFrame, path: Any) -> None:
+    """Draw the share of holes by tilt, a line a depth."""
+    lines(
+        table[table.holes > 0].assign(line=table.middle.map("middle at depth {:g}".format), holes=100 * table.holes),
+        path,
+        x="range",
+        y="holes",
+        by="line",
+        title="Pixels of a tilted plane that stay empty: depth evaluated twice, in 24 bits",
+        x_label=f"depth across {SIZE} pixels [of the depth range]",
+        y_label="empty pixels [%]",
+        log_x=True,
+        log_y=True,
+    )
