@@ -12,7 +12,7 @@ GAP = 0.02  # between layers
 
 
 def layered(layers: int, cells: int, seed: int = 0, opacity: float = 1.0) -> Scene:
-    """Layers of ``2 cells**2`` triangles, facing the viewer, in an order that the seed decides, 32 by 32.
+    """Layers of ``2 cells**2`` triangles, facing the viewer: back to front, or as the seed decides, 32 by 32.
 
     The order stands for the order in which a machine happens to start its warps: nothing promises another one.
     """
@@ -21,7 +21,7 @@ def layered(layers: int, cells: int, seed: int = 0, opacity: float = 1.0) -> Sce
     corner = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
     a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
     one = np.stack([a, b, c, b, d, c], axis=-1).reshape(-1, 3)
-    heights = -GAP * np.arange(layers)
+    heights = -GAP * np.arange(layers)[::-1]
     positions = np.concatenate([np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3) for z in heights])
     triangles = np.concatenate([one + k * x.size for k in range(layers)]).astype(np.int32)
     colors = np.random.default_rng(1).uniform(0.2, 1.0, (layers, 4))
@@ -38,7 +38,7 @@ def layered(layers: int, cells: int, seed: int = 0, opacity: float = 1.0) -> Sce
 
 
 def _shuffled(triangles: np.ndarray, seed: int) -> np.ndarray:
-    """Warps of triangles in another order; seed 0 leaves them."""
+    """Warps of triangles in another order; seed 0 leaves them back to front."""
     if seed == 0:
         return triangles
     warps = np.array_split(np.arange(len(triangles)), -(-len(triangles) // WARP))

@@ -1,0 +1,101 @@
+"""Four fragments a pixel: what Zhang's ROP loses of more layers (Zhang 2025, stage 9).
+
+A pixel keeps four covered fragments in shared memory and sorts those; the original does not check for more. Here the
+first four found are kept: the list has the newest first. Cure: no limit, as many rounds as the longest list needs.
+"""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from experiments.registry import Progress
+from experiments.result import Figure, Result
+from experiments.stability.boundary import Boundary, atlas_result, bisect
+from experiments.stability.layers import layered
+from reports.plots import lines
+from simulator.simulation import simulate
+from simulator.stages.zhang2025.rop import KEPT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+    from simulator.run import Run
+
+SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
+
+SIZE = 64  # pixels a side
+CELLS = 4
+LAYERS = (1, 2, 3, 4, 5, 6, 8, 12)
+ORDERS = {"oit": 5, "api": 0}  # and seed of the warps: api at its worst, back to front, where early z rejects nothing
+OPACITY = 0.5
+MACHINE = "rtx3080"
+
+
+@cache
+def frame(layers: int, order: str, limit: int = KEPT) -> "Run":
+    """Draw the layers, transparent where the order is ``oit``."""
+    opacity = OPACITY if order == "oit" else 1.0
+    scene = layered(layers, CELLS, ORDERS[order], opacity)
+    return simulate(scene, "binned", MACHINE, width=SIZE, height=SIZE, order=order, fragments_a_pixel=limit)
+
+
+def lost(layers: int, order: str) -> tuple[int, int]:
+    """Fragments beyond the limit, and pixels of another colour."""
+    made, whole = frame(layers, order), frame(layers, order, 0)
+    wrong = int((made.image != whole.image).any(axis=2).sum())
+    return int(made.frame.facts["fragments lost beyond the kept ones"]), wrong
+
+
+def boundary(order: str) -> tuple[float | None, float | None]:
+    """Layers that are drawn right, and layers that are not."""
+    return bisect(lambda layers: lost(int(layers), order)[1] > 0, LAYERS[0], LAYERS[-1], scale="integer")
+
+
+def run(progress: Progress) -> Result:
+    """Add layers."""
+    import pandas as pd
+
+    rows = []
+    for layers in LAYERS:
+        progress(f"stability/kept_fragments: {layers} layers")
+        for order in ORDERS:
+            fragments, pixels = lost(layers, order)
+            times = (frame(layers, order, limit).milliseconds for limit in (KEPT, 0))
+            rows.append((layers, order, fragments, 100 * pixels / SIZE**2, *times))
+    table = pd.DataFrame(rows, columns=["layers", "order", "fragments lost", "wrong", "four_ms", "all_ms"])
+    boundaries = [_boundary(table, order) for order in ORDERS]
+    figures = [Figure("wrong", lambda path: _plot(table, path))]
+    return atlas_result(
+        "stability/kept_fragments", "Four fragments a pixel", boundaries, figures, [], {"layers": table}
+    )
+
+
+def _boundary(table: "pd.DataFrame", order: str) -> Boundary:
+    rows = table[table.order == order]
+    last = rows.iloc[-1]
+    return Boundary(
+        f"binned, order {order}",
+        "layers over a pixel",
+        "",
+        *boundary(order),
+        f"layers are missing: {np.round(last.wrong):.0f} % of the pixels at {last.layers} layers",
+        "keep all fragments",
+        f"{last.all_ms:.4g} ms instead of {last.four_ms:.4g} on {MACHINE} at {last.layers} layers, more"
+        " shared memory not counted",
+    )
+
+
+def _plot(table: "pd.DataFrame", path: "Path") -> None:
+    lines(
+        table,
+        path,
+        x="layers",
+        y="wrong",
+        by="order",
+        title=f"Pixels that lack a layer with {KEPT} fragments kept",
+        x_label="layers over a pixel",
+        y_label="pixels [%]",
+    )

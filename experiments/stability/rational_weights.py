@@ -1,0 +1,130 @@
+"""Rational patches with weights near zero: parameters that crowd at an edge (Eisenacher & Loop 2010, section 1).
+
+Where the control points of one edge weigh little, nearly all of the surface lies at parameters close to that edge's:
+sub-patches there must be as small as the weight, and the depth limit drops them. Cure: other weights for the same
+surface, column k times ``alpha**k``, so that both ends move equally fast; once a model, before any frame.
+"""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.registry import Progress
+from experiments.result import Figure, Result
+from experiments.stability.boundary import Boundary, atlas_result, bisect
+from experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
+from reports.plots import lines
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+SIZE = 96  # pixels a side of the screen
+SQUARE = 0.8  # side of the patch over the screen's
+WEIGHTS = tuple(10.0**-k for k in range(13))
+TOLERANCE = 0.1  # of a boundary, relative
+CURES = ("as given", "balanced")
+
+
+def patch(weight: float, *, balanced: bool = False) -> NDArray[np.float32]:
+    """A flat square, (1, 16, 4), the edge u = 0 with another weight than the rest."""
+    points = flat_patch([[[x * SQUARE, y * SQUARE, 0] for x in (-1, 1)] for y in (-1, 1)]).astype(np.float64)
+    column = np.array([weight, 1.0, 1.0, 1.0])
+    if balanced:
+        column = balance(column)
+    return (points.reshape(1, 4, 4, 4) * column[:, None]).reshape(1, 16, 4).astype(np.float32)
+
+
+def balance(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (4,) of the same cubic that leaves both ends equally fast; the largest is 1."""
+    alpha = np.sqrt(weights[2] / weights[3] * weights[0] / weights[1])
+    scaled: NDArray[np.float64] = weights * alpha ** np.arange(4)
+    return scaled / scaled.max()
+
+
+@cache
+def frame(weight: float, *, balanced: bool = False) -> Split:
+    """Split and dice the square."""
+    return split(patch(weight, balanced=balanced), np.eye(4), SIZE, SIZE)
+
+
+@cache
+def missing(weight: float, *, balanced: bool = False) -> int:
+    """Pixels of the square that are not drawn."""
+    return int((draw(frame(1.0).grids, SIZE, SIZE).hits > 0).sum()) - int(
+        (draw(frame(weight, balanced=balanced).grids, SIZE, SIZE).hits > 0).sum()
+    )
+
+
+def boundary(*, balanced: bool = False) -> tuple[float | None, float | None]:
+    """Weight that holds, and weight that breaks."""
+    return bisect(lambda weight: missing(weight, balanced=balanced) > 0, WEIGHTS[0], WEIGHTS[-1], tolerance=TOLERANCE)
+
+
+def run(progress: Progress) -> Result:
+    """Take weight from one edge."""
+    import pandas as pd
+
+    progress("stability/rational_weights: one edge lighter and lighter")
+    rows = [_row(weight, cure) for cure in CURES for weight in WEIGHTS]
+    table = pd.DataFrame(rows)
+    boundaries = [_boundary(table, cure) for cure in CURES]
+    shown = [table[(table.cure == cure) & (table.weight == WEIGHTS[3])].iloc[0] for cure in CURES]
+    notes = [
+        f"At a weight of {WEIGHTS[3]:g} the square takes {shown[0].subpatches} sub-patches of up to {shown[0].depth}"
+        f" halvings as given, and {shown[1].subpatches} of up to {shown[1].depth} balanced; with equal weights"
+        f" {rows[0]['subpatches']} of {rows[0]['depth']}."
+    ]
+    figures = [
+        Figure("missing", lambda path: _plot(table, path, "percent", "pixels of the square that are missing [%]")),
+        Figure("subpatches", lambda path: _plot(table, path, "subpatches", "sub-patches")),
+    ]
+    title = "Rational weights near zero"
+    return atlas_result("stability/rational_weights", title, boundaries, figures, notes, {"weights": table})
+
+
+def _row(weight: float, cure: str) -> dict[str, float | str]:
+    made = frame(weight, balanced=cure == "balanced")
+    lost = missing(weight, balanced=cure == "balanced")
+    return {
+        "weight": weight,
+        "cure": cure,
+        "subpatches": len(made.subpatches.patch),
+        "depth": int(made.subpatches.level.max()),
+        "dropped": made.given_up,
+        "missing": lost,
+        "percent": 100 * lost / (SIZE * SQUARE) ** 2,
+        "ms": milliseconds(made.works),
+    }
+
+
+def _boundary(table: "pd.DataFrame", cure: str) -> Boundary:
+    rows = table[table.cure == cure]
+    plain, cured = (table[(table.cure == c) & (table.weight == 1)].iloc[0].ms for c in CURES)
+    given = cure == "as given"
+    return Boundary(
+        f"micropolygon, weights {cure}",
+        "weight of one edge",
+        "",
+        *boundary(balanced=not given),
+        f"sub-patches at that edge are dropped at the depth limit: up to {rows.percent.max():.0f} % of the square",
+        "balance the weights once a model" if given else "",
+        f"no time in the frame: {cured:.4g} ms of bound and split and dicing, {plain:.4g} as given" if given else "",
+    )
+
+
+def _plot(table: "pd.DataFrame", path: "Path", column: str, label: str) -> None:
+    lines(
+        table,
+        path,
+        x="weight",
+        y=column,
+        by="cure",
+        title="A flat square whose one edge weighs less",
+        x_label="weight of the edge (the others: 1)",
+        y_label=label,
+        log_x=True,
+    )
