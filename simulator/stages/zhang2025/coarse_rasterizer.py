@@ -91,7 +91,7 @@ def coarse_rasterizer(
     starts = np.concatenate([[0], np.cumsum(by_row.ravel())]).astype(np.int64)
     firsts = starts[:-1].reshape(by_row.shape).swapaxes(1, 2).reshape(columns * rows, tiles)
     entries = np.empty(int(starts[-1]), np.int32)
-    cursors = np.ascontiguousarray(firsts)
+    cursors = firsts.copy()  # of one bin, a view would move the starts
     for_parts(_coarse_rasterizer, len(events), *shape, counts, entries, cursors, np.zeros_like(events))
     events[:, CoarseRasterizerEvent.FILLS] = _fills(bins, columns, rows)
     _add_costs(events, counts, -(-len(data.ids) // BLOCK), simt)
