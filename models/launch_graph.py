@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+ROUNDING_US = 1e-9
+
 
 @dataclass(frozen=True)
 class Node:
@@ -15,11 +17,14 @@ class Node:
         Its own duration.
     after : tuple of str
         What it waits for in a graph.
+    shares : bool
+        Bound by memory: it shares the bandwidth with others that do.
     """
 
     name: str
     gpu_us: float
     after: tuple[str, ...] = ()
+    shares: bool = False
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,9 @@ def on_stream(nodes: Sequence[Node], launch_us: float, sync_us: float) -> FrameT
 
 
 def as_graph(nodes: Sequence[Node], step_us: float, sync_us: float) -> FrameTime:
-    """Run nodes as soon as what they wait for has ended; the longest path decides.
+    """Run nodes as soon as what they wait for has ended; the path that ends last decides.
+
+    Nodes that ``shares`` marks divide the memory's bandwidth among those that run together.
 
     Parameters
     ----------
@@ -74,12 +81,32 @@ def as_graph(nodes: Sequence[Node], step_us: float, sync_us: float) -> FrameTime
     KeyError
         A node that waits for one that does not come before it.
     """
-    end: dict[str, float] = {}
     path: dict[str, tuple[str, ...]] = {}
+    waiting, running, end = list(nodes), dict[str, float](), dict[str, float]()
+    known = {node.name: i for i, node in enumerate(nodes)}
     for node in nodes:
-        last = max(node.after, key=lambda name: end[name], default=None)
-        start = 0.0 if last is None else end[last]
-        end[node.name] = start + step_us + node.gpu_us
-        path[node.name] = (*(path[last] if last is not None else ()), node.name)
+        if any(known[name] >= known[node.name] for name in node.after):
+            raise KeyError(node.name)
+    shared = {node.name for node in nodes if node.shares}
+    delayed: dict[str, float] = {}  # start of nodes that wait for nothing any more
+    left = {node.name: node.gpu_us for node in nodes}
+    now = 0.0
+    while waiting or delayed or running:
+        for node in [n for n in waiting if all(name in end for name in n.after)]:
+            last = max(node.after, key=lambda name: end[name], default=None)
+            delayed[node.name] = (0.0 if last is None else end[last]) + step_us
+            path[node.name] = (*(path[last] if last is not None else ()), node.name)
+            waiting.remove(node)
+        pace = {name: 1.0 / max(1, len(shared & running.keys())) if name in shared else 1.0 for name in running}
+        next_end = min((now + left[name] / pace[name] for name in running), default=float("inf"))
+        moment = min(next_end, min(delayed.values(), default=float("inf")))
+        for name in running:
+            left[name] -= (moment - now) * pace[name]
+        now = moment
+        for name in [n for n in running if left[n] <= ROUNDING_US]:
+            end[name] = now
+            del running[name]
+        for name in [n for n, start in delayed.items() if start <= now]:
+            running[name] = delayed.pop(name)
     longest = max(end, key=lambda name: end[name])
     return FrameTime(end[longest], end[longest] + sync_us, path[longest])

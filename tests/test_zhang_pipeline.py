@@ -17,7 +17,7 @@ from simulator.stages.zhang2025.depth import DEPTH_STEPS
 from simulator.stages.zhang2025.fine_tile import quad_mask
 from simulator.stages.zhang2025.primitive_compaction import most_triangles
 from tests import naive_textured as naive
-from tests.test_ru_pipelines import soup
+from tests.textured_soup import soup
 
 WIDTH, HEIGHT = 141, 131  # two bins each way, no multiples of a tile
 SIMT = Simt()

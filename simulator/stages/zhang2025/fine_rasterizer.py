@@ -117,11 +117,11 @@ def _by_block(events: NDArray[np.int64], group: int) -> NDArray[np.int64]:
     tiles = padded.reshape(-1, group, columns, count)
     slowest = tiles[..., event.EARLY_Z_STEPS].argmax(axis=1)[:, None, :, None]
     critical = np.take_along_axis(tiles, slowest, axis=1)[:, 0]
-    table = tiles.sum(axis=1)
+    table: NDArray[np.int64] = tiles.sum(axis=1)
     table[..., event.CRITICAL_ROUNDS] = critical[..., event.ROUNDS]
     table[..., event.CRITICAL_Z_STEPS] = critical[..., event.EARLY_Z_STEPS]
     table[..., event.CRITICAL_QUAD_STEPS] = critical[..., event.QUAD_STEPS]
-    return table.reshape(-1, count)
+    return np.reshape(table, (-1, count))
 
 
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
