@@ -96,17 +96,16 @@ def _steps(axes: Any, front: "pd.DataFrame") -> None:
 
 
 def _label(axes: Any, shown: "pd.DataFrame") -> None:
-    """Write names beside their points, below where the next one to the left is as high; too many are left out."""
+    """Write names beside their points, lower where the next one to the left is as high; too many are left out."""
     named = shown.drop_duplicates(["name", "cost", "height"]).sort_values("cost")
     if len(named) > MOST_NAMES and "front" in named:
         named = named[named["front"] | named["published"].astype(bool)]
     placed: list[tuple[float, float]] = []
     for point in named.itertuples():
         x, y = axes.transAxes.inverted().transform(axes.transData.transform((point.cost, point.height)))
-        crowded = any(0 <= x - left < NAME_WIDTH and abs(y - other) < NAME_HEIGHT for left, other in placed)
-        y = y - NAME_HEIGHT if crowded else y
-        placed.append((x, y))
-        offset, side = ((5, -4), "top") if crowded else ((5, 3), "bottom")
-        axes.annotate(
-            point.name, (point.cost, point.height), xytext=offset, textcoords="offset points", fontsize=7, va=side
-        )
+        height = y + 0.6 * NAME_HEIGHT
+        while any(abs(x - left) < NAME_WIDTH and abs(height - other) < NAME_HEIGHT for left, other in placed):
+            height -= 0.1 * NAME_HEIGHT
+        placed.append((x, height))
+        side, gap = ("right", -0.012) if x > 1.0 - NAME_WIDTH else ("left", 0.012)
+        axes.annotate(point.name, (x + gap, height), xycoords="axes fraction", fontsize=7, va="center", ha=side)

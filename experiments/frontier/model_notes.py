@@ -78,9 +78,10 @@ def _about_others(ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.Data
         (
             f"Against published and measured times the full run is {100 * full.error_against_known:.1f} % off in the "
             f"mean. Detailed simulators by others would take {_span(drawn.seconds.min())} to "
-            f"{_span(drawn.seconds.max())} for the mean frame: its warp instructions over their speed, which {direct} of them publish and "
-            f"{len(drawn) - direct} give as a ratio to another. Their errors are the ones they report, each on its own "
-            f"workloads and machine, so heights are not of one race; only the seconds are of one frame."
+            f"{_span(drawn.seconds.max())} for the mean frame: its warp instructions over their speed, which {direct} "
+            f"of them publish and {len(drawn) - direct} give as a ratio to another. Their errors are the ones they "
+            f"report, each on its own workloads and machine, so the heights are not of one race; only the "
+            f"seconds are of one frame."
         ),
         f"{len(silent)} more report an error but no speed that was found: {', '.join(silent.name)}.",
         f"On the front of the second chart: {', '.join(front.name)}.",
