@@ -20,12 +20,16 @@ class Stream:
         Bytes of all transactions on it.
     footprint_bytes : int
         Bytes of the distinct segments touched.
+    span_bytes : int
+        Bytes that the launch touches between the first and the last touch of a segment: where they fit, it is fetched
+        or written once. 0: all footprints of the launch.
     """
 
     buffer: str
     op: Literal["load", "store", "atomic"]
     bytes: int
     footprint_bytes: int
+    span_bytes: int = 0
 
 
 @dataclass(frozen=True)

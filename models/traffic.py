@@ -2,9 +2,10 @@
 
 Without a cache every byte of every transaction goes to DRAM. With an L2, a launch fetches the part of each buffer's
 footprint that no earlier launch of the frame left there; bytes beyond the footprint are read again and miss only by
-the share in which all footprints of the launch together exceed the cache. Stores stay in the cache until something
-pushes them out (write-back), and the launch that does so pays. What is in the cache is kept by buffer, least recently
-used first: a frame's launches hand whole buffers to each other, so buffers and not lines are what is reused.
+the share in which all footprints of the launch together (or the span that a stream names) exceed the cache. Stores
+stay in the cache until something pushes them out (write-back), and the launch that does so pays. What is in the cache is
+kept by buffer, least recently used first: a frame's launches hand whole buffers to each other, so buffers and not lines
+are what is reused.
 """
 
 from __future__ import annotations
@@ -78,11 +79,11 @@ def _launch_traffic(streams: tuple[Stream, ...], cache: _Cache) -> Traffic:
     if cache.capacity == 0:
         return Traffic(moved, 0.0, 1.0)
     working_set = sum(_footprints(streams).values())
-    again = max(0.0, 1.0 - cache.capacity / working_set) if working_set else 0.0  # reuse that misses
     dram = loaded = missed = 0.0
     for stream in streams:
         footprint = min(stream.footprint_bytes, stream.bytes)
-        reuse = (stream.bytes - footprint) * again
+        span = stream.span_bytes or working_set
+        reuse = (stream.bytes - footprint) * max(0.0, 1.0 - cache.capacity / span) if span else 0.0  # what misses
         fetched = 0.0 if stream.op == "store" else max(0.0, footprint - cache.holds(stream.buffer))
         dram += fetched + reuse + cache.touch(stream.buffer, footprint, written=stream.op != "load")
         if stream.op == "load":
