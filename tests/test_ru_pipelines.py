@@ -16,7 +16,7 @@ from simulator.scenes.camera import LookAt
 from simulator.scenes.scene import Mesh, Scene
 from simulator.scenes.textured_mesh import geometry
 from simulator.stages.ru2016.fragment_shading import interpolate
-from simulator.stages.ru2016.tile_lists import overlaps
+from simulator.stages.ru2016.tile_lists_fill import overlaps
 from simulator.stages.ru2016.tiled_raster import Visible
 from simulator.stages.ru2016.vertex_shading import vertex_shading
 from tests import naive_textured as naive

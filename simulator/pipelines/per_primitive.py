@@ -9,7 +9,7 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
 from simulator.scenes.texture import texture_chains
-from simulator.scenes.textured_mesh import geometry
+from simulator.scenes.textured_mesh import draws, geometry
 from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
 from simulator.stages.ru2016.clear import clear
 from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
@@ -49,13 +49,16 @@ def per_primitive(
     """
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
-    works = clear(width, height, 0, simt)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt)
+    parts = draws(scene, mesh)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
+    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
+    works = [work for part in zip(shading, assembly, strict=True) for work in part]
+    works += clear(width, height, 0, simt)
     meant, raced, raster = per_primitive_raster(
-        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces
-    )
-    works += [shading, assembly, raster]
+        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces,
+        textured=bool((mesh.texture_ids >= 0).any()),
+    )  # fmt: skip
+    works.append(raster)
     wrong = raced.triangles != meant.triangles
     visible = Visible(raced.triangles, meant.depth) if race else meant
     fragments = interpolate(mesh, vertices, visible, perspective=perspective)
@@ -63,6 +66,7 @@ def per_primitive(
     if ssao:
         light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
         works.append(occlusion)
+    waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
     return Frame(
         image,
@@ -70,5 +74,9 @@ def per_primitive(
         works + finish,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
         maps={"pixels wrong by the race": wrong.astype(np.int64)},
-        facts={"pixels wrong by the race": int(wrong.sum()), "pixels drawn": int((meant.triangles >= 0).sum())},
+        facts={
+            "pixels wrong by the race": int(wrong.sum()),
+            "pixels drawn": int((meant.triangles >= 0).sum()),
+            "launches that the host waits for": waits,
+        },
     )

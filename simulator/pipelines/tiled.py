@@ -10,7 +10,7 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.scenes.scene import Scene
 from simulator.scenes.texture import texture_chains
-from simulator.scenes.textured_mesh import geometry
+from simulator.scenes.textured_mesh import draws, geometry
 from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
 from simulator.stages.ru2016.clear import clear
 from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
@@ -59,9 +59,11 @@ def tiled(
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
-    works = clear(width, height, tiles, simt)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt)
+    parts = draws(scene, mesh)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
+    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
+    works = [work for part in zip(shading, assembly, strict=True) for work in part]
+    works += clear(width, height, tiles, simt)
     lists, listing, lost = tile_lists(
         vertices.screen,
         mesh.triangles,
@@ -74,12 +76,13 @@ def tiled(
         capacity=capacity,
     )
     visible, raster = tiled_raster(vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile)
-    works += [shading, assembly, *listing, raster]
+    works += [*listing, raster]
     fragments = interpolate(mesh, vertices, visible, perspective=perspective)
     light = np.ones((height, width), np.float32)
     if ssao:
         light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
         works.append(occlusion)
+    waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
     sizes = np.diff(lists.starts)
     return Frame(
@@ -96,6 +99,7 @@ def tiled(
             "triangles not drawn (behind the eye, or not finite)": len(scene.mesh.triangles) - len(drawable)
             if scene.mesh
             else 0,
+            "launches that the host waits for": waits,
         },
     )
 

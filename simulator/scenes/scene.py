@@ -51,6 +51,8 @@ class Mesh:
     texture_ids : ndarray, (F,), int32, or None
         Texture of each triangle, -1 where it has none.
     textures : tuple of ndarray, (H, W, 4), uint8
+    draws : ndarray, (D, 2), int64, or None
+        Vertices and triangles of each part that its file has drawn by itself, in order; one part where None.
     """
 
     positions: NDArray[np.float32]
@@ -61,6 +63,7 @@ class Mesh:
     uvs: NDArray[np.float32] | None = None
     texture_ids: NDArray[np.int32] | None = None
     textures: tuple[NDArray[np.uint8], ...] = ()
+    draws: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)

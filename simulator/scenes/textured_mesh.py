@@ -67,6 +67,15 @@ def geometry(scene: Scene) -> Geometry:
     return Geometry(positions, triangles, _clean(colors), _clean(normals), _clean(uvs), textures, ids)
 
 
+def draws(scene: Scene, mesh: Geometry) -> NDArray[np.int64]:
+    """Vertices and triangles (D, 2) of each draw of a scene whose geometry is ``mesh``; one where it knows of none."""
+    parts = scene.mesh.draws if scene.mesh is not None else None
+    if parts is None:
+        return np.array([[len(mesh.positions), len(mesh.triangles)]])
+    bounds = np.concatenate([[0], np.cumsum(parts[:, 1])])
+    return np.stack([parts[:, 0], np.diff(np.searchsorted(mesh.ids, bounds))], axis=1)
+
+
 def _clean(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Put 0 for what is not finite."""
     return np.nan_to_num(values, posinf=0.0, neginf=0.0).astype(np.float32)
@@ -196,4 +205,5 @@ def _join(parts: list[dict[str, Any]], textures: tuple[NDArray[np.uint8], ...]) 
     for part, start in zip(parts, starts, strict=True):
         part["triangles"] = part["triangles"] + np.int32(start)
     columns: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Mesh(**columns, textures=textures)
+    draws = np.array([[len(part["positions"]), len(part["triangles"])] for part in parts], np.int64)
+    return Mesh(**columns, textures=textures, draws=draws)

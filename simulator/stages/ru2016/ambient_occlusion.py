@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
-from simulator.stages.ru2016.fragment_shading import BLOCK, Fragments
+from simulator.stages.ru2016.fragment_shading import Fragments
+from simulator.stages.ru2016.fragment_shading_work import BLOCK
 from simulator.stages.ru2016.vertex_shading import EyeSpace
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work

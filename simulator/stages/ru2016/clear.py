@@ -1,11 +1,14 @@
-"""Clears before each frame (Ru 2016): the fragment buffer, the depth buffer and, with tiles, the list counters."""
+"""Clears of each frame (Ru 2016): the colours always; with tiles the list counters, else fragments and depth.
+
+A tile writes every fragment and depth of its pixels, so the tiled path has nothing else to clear.
+"""
 
 from models.simt import Simt
 from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work
 
-BLOCK = 256  # threads of the runtime's memset (assumed)
+BLOCK = 256  # threads of the runtime's memset, four words each (assumed)
 
 
 def clear(width: int, height: int, tiles: int, simt: Simt) -> list[Work]:
@@ -25,12 +28,8 @@ def clear(width: int, height: int, tiles: int, simt: Simt) -> list[Work]:
         One for each buffer.
     """
     pixels = width * height
-    words = pixels * FRAGMENT_BYTES // 4
-    works = [
-        thread_per_item("clear", "clear_fragments", words, BLOCK, simt, stores=(Access("fragments", 4, 1),)),
-        thread_per_item("clear", "clear_depth", pixels, BLOCK, simt, stores=(Access("depth", 4, 1),)),
+    words = {"tile_counters": tiles} if tiles else {"fragments": pixels * FRAGMENT_BYTES // 4, "depth": pixels}
+    return [
+        thread_per_item("clear", f"clear_{buffer}", -(-count // 4), BLOCK, simt, stores=(Access(buffer, 16, 1, 16),))
+        for buffer, count in {**words, "colors": 3 * pixels}.items()
     ]
-    if tiles:
-        counters = (Access("tile_counters", 4, 1),)
-        works.append(thread_per_item("clear", "clear_counters", tiles, BLOCK, simt, stores=counters))
-    return works

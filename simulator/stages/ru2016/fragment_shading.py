@@ -5,47 +5,29 @@ the screen, and multiplies by the interpolated depth; the switch shows the plain
 the eye; nearest or bilinear filtering. Kernels of 8x8 threads.
 """
 
-from enum import IntEnum
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
 from simulator.scenes.texture import TextureChains, add_bilinear, nearest
 from simulator.scenes.textured_mesh import Geometry
-from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, Visible
+from simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
+from simulator.stages.ru2016.tiled_raster import Visible
 from simulator.stages.ru2016.triangle import area, barycentric, corners
 from simulator.stages.ru2016.vertex_shading import ShadedVertices
-from simulator.stages.thread_per_item import Access, record_transactions, thread_per_item
+from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work
 
-SIDE = 8  # threads
-BLOCK = SIDE * SIDE
-LOOK_WORDS = 2  # of a fragment, read to see whether it is there (assumed)
 AMBIENT = np.float32(0.2)
 DIFFUSE = np.float32(0.8)
 Filter = Literal["nearest", "bilinear"]
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
-
-
-class FragmentShadingEvent(IntEnum):
-    """Events of one block of 8x8 pixels."""
-
-    BLOCKS = 0
-    WARPS = 1  # look at the fragment: is there one?
-    WARP_LANES = 2
-    DRAWN_WARPS = 3  # warps with a fragment: read the rest of it, sample, shade
-    DRAWN_LANES = 4
-    LOAD_TRANSACTIONS = 5
-    LOAD_BYTES = 6
-    STORE_TRANSACTIONS = 7
-    STORE_BYTES = 8
 
 
 class Fragments(NamedTuple):
@@ -211,39 +193,9 @@ def fragment_shading(
     )
     pixels = width * height
     colors = Access("colors", 12, 3)
+    drawn = visible.triangles >= 0
+    textures = np.where(drawn, mesh.texture_ids[visible.triangles], np.int32(-1))
     return image, [
-        _shading_work(visible.triangles >= 0, texture_filter, simt),
-        thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), (Access("window", 4, 1),)),
+        shading_work(drawn, textures, fragments.uvs, chains, texture_filter, simt),
+        thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), (Access("window", 4, 4, word_bytes=1),)),
     ]
-
-
-def _shading_work(drawn: NDArray[np.bool_], texture_filter: Filter, simt: Simt) -> Work:
-    """Count the shading kernel: a warp is 8x4 pixels; one without a fragment reads two words of each, stores black."""
-    event = FragmentShadingEvent
-    rows, columns = -(-drawn.shape[0] // SIDE), -(-drawn.shape[1] // SIDE)
-    padded = np.zeros((rows * SIDE, columns * SIDE), np.int64)
-    padded[: drawn.shape[0], : drawn.shape[1]] = drawn
-    lanes = padded.reshape(rows, 2, SIDE // 2, columns, SIDE).sum(axis=(2, 4)).swapaxes(1, 2).reshape(-1, 2)
-    table = np.zeros((rows * columns, len(event)), np.int64)
-    table[:, event.BLOCKS] = 1
-    table[:, event.WARPS] = BLOCK // simt.warp
-    table[:, event.WARP_LANES] = BLOCK
-    table[:, event.DRAWN_WARPS] = (lanes > 0).sum(axis=1)
-    table[:, event.DRAWN_LANES] = lanes.sum(axis=1)
-    word = record_transactions(Access("fragments", FRAGMENT_BYTES, 1), simt)
-    stored = record_transactions(Access("colors", 12, 3), simt)
-    texels = 4 if texture_filter == "bilinear" else 1
-    words = table[:, event.WARPS] * LOOK_WORDS + table[:, event.DRAWN_WARPS] * (FRAGMENT_BYTES // 4 - LOOK_WORDS)
-    for column, k in ((event.LOAD_TRANSACTIONS, 0), (event.LOAD_BYTES, 1)):
-        table[:, column] = words * word[k] + texels * table[:, event.DRAWN_LANES] // 2 * (1, 32)[k]
-    for column, k in ((event.STORE_TRANSACTIONS, 0), (event.STORE_BYTES, 1)):
-        table[:, column] = table[:, event.WARPS] * stored[k]
-    total = table.sum(axis=0)
-    pixels, fragments = drawn.size, int(total[event.DRAWN_LANES])
-    streams = (
-        Stream("fragments", "load", 32 * pixels + 32 * fragments, FRAGMENT_BYTES * pixels),
-        Stream("texture", "load", 16 * texels * fragments, 16 * texels * fragments),
-        Stream("colors", "store", 12 * pixels, 12 * pixels),
-    )
-    kernel = f"fragment_shading_{texture_filter}"
-    return Work("fragment_shading", kernel, event, table, len(table), BLOCK, streams=streams)

@@ -1,8 +1,10 @@
 """Tiled raster: one block a tile, one thread a pixel (Ru 2016, "Tile-based rasterization").
 
-Every thread walks the tile's list and reads each whole primitive from global memory (no shared memory): three area
-evaluations, a depth test in registers, and where it is nearer the attributes are interpolated at once. The fragment is
-written once at the end. A tile smaller than a warp leaves lanes of it idle (4x4: half of them).
+Every thread walks the tile's list and reads the primitive from global memory (no shared memory): x and y of three
+vertices for the areas; z and w where it lies inside, for the depth test in registers; all attributes where it is
+nearer, to interpolate them at once. The fragment is written once at the end. A tile smaller than a warp leaves lanes of
+it idle (4x4: half of them). Nothing holds the warps of a block together but its end: each walks the list by itself,
+one dependent load after another.
 
 Depth is interpolated linearly on the screen, in float32; equal depths keep the entry that came first.
 """
@@ -18,12 +20,17 @@ from models.coalescing import transactions
 from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
-from simulator.stages.ru2016.tile_lists import TileLists
+from simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from simulator.stages.ru2016.triangle import area, barycentric, corners, inside
-from simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
 from simulator.work import Work
 
-FRAGMENT_BYTES = 60  # colour, eye position, eye normal, texture coordinate, texture pointer
+FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
+FRAGMENT_WORDS = 11  # of 4 bytes, stored one by one
+FRAGMENT_POINTERS = 1  # of 8 bytes
+THREADS_AN_SM = 1024  # resident: 50 % of 2048, as 63 registers allow
+TEST_LOADS = 7  # the entry, and x and y of three vertices
+HIT_LOADS = 6  # z and w of three vertices
+NEARER_LOADS = 27  # eye position, normal, texture coordinate of three vertices; pointer, width and height
 FAR = np.float32(1.0)
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
@@ -38,7 +45,7 @@ class TiledRasterEvent(IntEnum):
     TEST_WARPS = 2  # warp executions of the barycentric test: one for each warp and list entry
     SAMPLE_TESTS = 3
     SAMPLE_HITS = 4
-    HIT_WARPS = 5  # warp executions of the depth test
+    HIT_WARPS = 5  # warp executions of the depth and its test
     NEARER_WARPS = 6  # warp executions of the interpolation
     NEARER_LANES = 7
     ENTRIES = 8  # list entries: the dependent chain of the block
@@ -46,6 +53,8 @@ class TiledRasterEvent(IntEnum):
     LOAD_BYTES = 10
     STORE_TRANSACTIONS = 11
     STORE_BYTES = 12
+    LONGEST_HITS = 13  # depth tests of the warp that makes most
+    LONGEST_NEARER = 14  # interpolations of the warp that makes most
 
 
 class Visible(NamedTuple):
@@ -68,7 +77,7 @@ def _tile(
     screen: Any, triangles: Any, entries: Any, x_first: int, y_first: int, tile: int, warp: int,
     visible: Any, depth: Any, marks: Any, row: Any,
 ) -> None:  # fmt: skip
-    """Rasterize one tile's list; ``marks``, (2, warps), is scratch for the warps that hit and that come nearer."""
+    """Rasterize one tile's list; ``marks``, (4, warps): who hits and who comes nearer now, and how often so far."""
     height, width = depth.shape
     for t in entries:
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
@@ -95,10 +104,10 @@ def _tile(
                         marks[1, w] = 1
         if row is not None:
             for w in range(marks.shape[1]):
-                row[5] += marks[0, w]
-                row[6] += marks[1, w]
-                marks[0, w] = 0
-                marks[1, w] = 0
+                for k in range(2):
+                    row[5 + k] += marks[k, w]  # HIT_WARPS, NEARER_WARPS
+                    marks[2 + k, w] += marks[k, w]
+                    marks[k, w] = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -109,7 +118,7 @@ def _band(
     """Rasterize a row of tiles."""
     columns = (depth.shape[1] + tile - 1) // tile
     warps = (tile * tile + warp - 1) // warp
-    marks = np.zeros((2, warps), np.int64)
+    marks = np.zeros((4, warps), np.int64)
     for column in range(columns):
         i = tile_row * columns + column
         listed = entries[starts[i] : starts[i + 1]]
@@ -121,6 +130,9 @@ def _band(
             events[i, 2] = warps * len(listed)
             events[i, 3] = tile * tile * len(listed)
             events[i, 8] = len(listed)
+            events[i, 13] = marks[2].max()  # LONGEST_HITS
+            events[i, 14] = marks[3].max()  # LONGEST_NEARER
+            marks[:] = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -166,25 +178,43 @@ def tiled_raster(
     parts = parts_of(-(-height // tile))
     for_parts(_tiled_raster, parts, screen, triangles, *lists, tile, simt.warp, *visible, events)
     _add_traffic(events, simt, tile)
-    total = events.sum(axis=0)
     drawn = len(np.unique(lists.entries))
-    streams = (
-        Stream("tile_lists", "load", 4 * len(lists.entries), 4 * len(lists.entries)),
-        Stream("primitives", "load", 224 * int(total[TiledRasterEvent.TEST_WARPS]), drawn * PRIMITIVE_BYTES),
-        Stream("fragments", "store", width * height * (FRAGMENT_BYTES + 4), width * height * (FRAGMENT_BYTES + 4)),
+    entries = len(lists.entries)
+    streams = (  # of a primitive, what the first warp of a block fetches: the others find it in L2
+        Stream("tile_lists", "load", SECTOR_BYTES * entries, 4 * entries),
+        Stream("primitives", "load", 3 * SECTOR_BYTES * entries, drawn * 3 * SECTOR_BYTES),
+        Stream(  # a store of 4 bytes takes a sector of L2, where the words of a fragment meet
+            "fragments",
+            "store",
+            width * height * ((FRAGMENT_WORDS + FRAGMENT_POINTERS) * SECTOR_BYTES + 4),
+            width * height * (FRAGMENT_BYTES + 4),
+            span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
+        ),
     )
     work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
     return visible, work
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
-    """All lanes read the same words, a transaction each; fragments are stored word by word, 60 bytes apart."""
+    """All lanes read the same words, a transaction each; fragments are stored word by word, 56 bytes apart."""
     segment = 128 if simt.coalescing == 2 else 32
-    reads = events[:, TiledRasterEvent.TEST_WARPS] * (PRIMITIVE_BYTES // 4 + 1)  # the primitive, and its number
+    reads = (
+        events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
+        + events[:, TiledRasterEvent.HIT_WARPS] * HIT_LOADS
+        + events[:, TiledRasterEvent.NEARER_WARPS] * NEARER_LOADS
+    )
     lanes = np.where(np.arange(simt.warp) < tile * tile, np.arange(simt.warp), -1)
     addresses = np.where(lanes >= 0, (lanes // tile * 800 + lanes % tile) * FRAGMENT_BYTES, -1)
-    count, size = transactions(addresses, simt.warp, 4, int(simt.coalescing))
-    writes = events[:, TiledRasterEvent.WARPS] * (FRAGMENT_BYTES // 4 + 1)
+    count, size = (
+        FRAGMENT_WORDS * words + FRAGMENT_POINTERS * pointers + depths
+        for words, pointers, depths in zip(
+            transactions(addresses, simt.warp, 4, int(simt.coalescing)),
+            transactions(addresses, simt.warp, 8, int(simt.coalescing)),
+            transactions(addresses // FRAGMENT_BYTES * 4, simt.warp, 4, int(simt.coalescing)),
+            strict=True,
+        )
+    )
+    writes = events[:, TiledRasterEvent.WARPS]
     events[:, TiledRasterEvent.LOAD_TRANSACTIONS] = reads
     events[:, TiledRasterEvent.LOAD_BYTES] = reads * segment
     events[:, TiledRasterEvent.STORE_TRANSACTIONS] = writes * count

@@ -1,8 +1,9 @@
 """Vertex shading and primitive assembly (Ru 2016: "Vertex assembly and vertex shader", "Primitive assembly").
 
 One thread a vertex transforms it to the screen and to eye space; one thread an *index* then copies the whole vertex
-into its primitive. Both kernels run 128 threads a block. The original does not clip: a triangle with a vertex behind
-the eye (w <= 0) is garbage there and is dropped here, and counted.
+into its primitive. Both kernels run 128 threads a block, and are launched for each part of the model by itself, the
+host waiting after each (an engine of 115 parts: 230 launches). The original does not clip: a triangle with a vertex
+behind the eye (w <= 0) is garbage there and is dropped here, and counted.
 
 The pipeline is given one model-to-clip matrix; its rows give the eye's axes, since for a perspective without skew
 row 0 is the right axis, row 1 the up axis and row 3 the forward axis, each times a factor.
@@ -21,7 +22,8 @@ from simulator.work import Work
 
 BLOCK = 128  # threads
 VERTEX_BYTES = 64  # position, eye position, eye normal, texture coordinate, texture pointer and size
-PRIMITIVE_BYTES = 3 * VERTEX_BYTES + 4  # three vertices and a type
+PRIMITIVE_BYTES = 3 * VERTEX_BYTES + 8  # three vertices and a type, padded to the alignment of the pointers
+INDEX_BYTES = 2
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
 
@@ -86,8 +88,8 @@ def _vertex_shading(
 
 
 def vertex_shading(
-    mesh: Geometry, matrix: NDArray[Any], width: int, height: int, simt: Simt
-) -> tuple[ShadedVertices, Work]:
+    mesh: Geometry, matrix: NDArray[Any], width: int, height: int, simt: Simt, parts: NDArray[np.int64] | None = None
+) -> tuple[ShadedVertices, list[Work]]:
     """Transform vertices to the screen, normals to eye space.
 
     Parameters
@@ -98,10 +100,13 @@ def vertex_shading(
     width, height : int
         Pixels.
     simt : Simt
+    parts : ndarray, (D, 2), int64, or None
+        Vertices and triangles of each draw.
 
     Returns
     -------
-    ShadedVertices, Work
+    ShadedVertices, list of Work
+        A launch each part.
     """
     count = len(mesh.positions)
     out = ShadedVertices(np.empty((count, 4), np.float32), np.empty((count, 3), np.float32))
@@ -114,23 +119,36 @@ def vertex_shading(
         np.float32(height),
         *out,
     )
-    loads = (Access("positions", 12, 3), Access("normals", 12, 3), Access("uvs", 8, 2))
-    stores = (Access("vertices", VERTEX_BYTES, VERTEX_BYTES // 4),)
-    return out, thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, loads, stores)
+    sizes = [count] if parts is None else parts[:, 0].tolist()
+    return out, [_shading_work(size, i, simt) for i, size in enumerate(sizes)]
 
 
-def primitive_assembly(mesh: Geometry, vertices: ShadedVertices, simt: Simt) -> tuple[NDArray[np.int32], Work]:
+def _shading_work(count: int, part: int, simt: Simt) -> Work:
+    loads = (Access(f"positions {part}", 12, 3), Access(f"normals {part}", 12, 3), Access(f"uvs {part}", 8, 2))
+    stores = (Access(f"vertices {part}", VERTEX_BYTES, VERTEX_BYTES // 4),)
+    return thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, loads, stores)
+
+
+def primitive_assembly(
+    mesh: Geometry, vertices: ShadedVertices, simt: Simt, parts: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.int32], list[Work]]:
     """Copy each index's vertex into its primitive; drop what the original cannot draw.
 
     Returns
     -------
     drawable : ndarray, (F',), int32
         Triangles whose vertices are all before the eye, in order.
-    Work
+    list of Work
+        A launch each part.
     """
     before = (vertices.screen[:, 3] > 0.0)[mesh.triangles].all(axis=1)
-    loads = (Access("indices", 4, 1), Access("vertices", VERTEX_BYTES, VERTEX_BYTES // 4))
+    sizes = [len(mesh.triangles)] if parts is None else parts[:, 1].tolist()
+    works = [_assembly_work(3 * size, i, simt) for i, size in enumerate(sizes)]
+    return np.flatnonzero(before).astype(np.int32), works
+
+
+def _assembly_work(indices: int, part: int, simt: Simt) -> Work:
+    vertices = Access(f"vertices {part}", VERTEX_BYTES, VERTEX_BYTES // 4)
+    loads = (Access(f"indices {part}", INDEX_BYTES, 1), vertices)
     stores = (Access("primitives", PRIMITIVE_BYTES // 3, VERTEX_BYTES // 4),)
-    indices = 3 * len(mesh.triangles)
-    work = thread_per_item("primitive_assembly", "primitive_assembly", indices, BLOCK, simt, loads, stores)
-    return np.flatnonzero(before).astype(np.int32), work
+    return thread_per_item("primitive_assembly", "primitive_assembly", indices, BLOCK, simt, loads, stores)

@@ -1,0 +1,122 @@
+"""What the shading kernel reads and writes: fragments word by word, texels byte by byte (Ru 2016)."""
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.launch import Stream
+from models.simt import Simt
+from simulator.scenes.texture import TextureChains
+from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
+from simulator.stages.thread_per_item import Access, record_transactions
+from simulator.work import Work
+
+SIDE = 8  # threads
+BLOCK = SIDE * SIDE
+LINE_BYTES = 128
+TEXEL_BYTES = 3  # RGB8, a load for each byte
+LOOK_WORDS = 1  # of a fragment: whether to shade it
+LIGHT_WORDS = 5  # texture pointer (8 bytes), normal: whatever is shaded
+TEXTURE_WORDS = 4  # coordinate, width, height
+BILINEAR_TEXELS = 4
+
+
+class FragmentShadingEvent(IntEnum):
+    """Events of one block of 8x8 pixels."""
+
+    BLOCKS = 0
+    WARPS = 1  # look at the fragment: is there one?
+    WARP_LANES = 2
+    DRAWN_WARPS = 3  # warps with a fragment: read the rest of it, shade
+    DRAWN_LANES = 4
+    DRAWN_BLOCKS = 5  # 1 where there is one: the dependent chain
+    TEXTURED_WARPS = 6  # warps with a textured fragment: sample
+    TEXTURED_LANES = 7
+    TEXTURED_BLOCKS = 8
+    LOAD_TRANSACTIONS = 9
+    LOAD_BYTES = 10
+    STORE_TRANSACTIONS = 11
+    STORE_BYTES = 12
+
+
+def shading_work(
+    drawn: NDArray[np.bool_],
+    textures: NDArray[np.int32],
+    uvs: NDArray[np.float32],
+    chains: TextureChains,
+    texture_filter: str,
+    simt: Simt,
+) -> Work:
+    """Count the shading kernel.
+
+    Parameters
+    ----------
+    drawn : ndarray, (H, W), bool
+    textures : ndarray, (H, W), int32
+        Texture of each fragment, -1 for none.
+    uvs : ndarray, (H, W, 2), float32
+    chains : TextureChains
+    texture_filter : {"nearest", "bilinear"}
+    simt : Simt
+    """
+    event = FragmentShadingEvent
+    shaded, textured = _by_warp(drawn), _by_warp(textures >= 0)
+    table = np.zeros((len(shaded) // 2, len(event)), np.int64)
+    table[:, event.BLOCKS] = 1
+    table[:, event.WARPS] = BLOCK // simt.warp
+    table[:, event.WARP_LANES] = BLOCK
+    for warps, covered in ((event.DRAWN_WARPS, shaded), (event.TEXTURED_WARPS, textured)):
+        lanes = covered.sum(axis=1).reshape(-1, 2)
+        table[:, warps] = (lanes > 0).sum(axis=1)
+        table[:, warps + 1] = lanes.sum(axis=1)
+        table[:, warps + 2] = lanes.any(axis=1)
+    lines, footprint = _texel_lines(textures, uvs, chains)
+    texels = BILINEAR_TEXELS if texture_filter == "bilinear" else 1
+    texel_lines = texels * TEXEL_BYTES * lines.reshape(-1, 2).sum(axis=1)
+    word = record_transactions(Access("fragments", FRAGMENT_BYTES, 1), simt)
+    stored = record_transactions(Access("colors", 12, 3), simt)
+    words = (
+        table[:, event.WARPS] * LOOK_WORDS
+        + table[:, event.DRAWN_WARPS] * LIGHT_WORDS
+        + table[:, event.TEXTURED_WARPS] * TEXTURE_WORDS
+    )
+    table[:, event.LOAD_TRANSACTIONS] = words * word[0] + texel_lines
+    table[:, event.LOAD_BYTES] = words * word[1] + texel_lines * LINE_BYTES
+    table[:, event.STORE_TRANSACTIONS] = table[:, event.DRAWN_WARPS] * stored[0]
+    table[:, event.STORE_BYTES] = table[:, event.DRAWN_WARPS] * stored[1]
+    fragments, pixels = int(drawn.sum()), drawn.size
+    texture_bytes = 32 * texels * int(table[:, event.TEXTURED_LANES].sum())
+    streams = (
+        Stream("fragments", "load", 32 * (pixels + fragments), min(32 * (pixels + fragments), FRAGMENT_BYTES * pixels)),
+        Stream("texture", "load", texture_bytes, min(texture_bytes, footprint * LINE_BYTES)),
+        Stream("colors", "store", 12 * fragments, 12 * fragments),
+    )
+    kernel = f"fragment_shading_{texture_filter}"
+    return Work("fragment_shading", kernel, event, table, len(table), BLOCK, streams=streams)
+
+
+def _by_warp(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Pixels as warps of 8x4, two a block of 8x8, (warps, 32); 0 beyond the picture."""
+    rows, columns = -(-pixels.shape[0] // SIDE), -(-pixels.shape[1] // SIDE)
+    padded = np.zeros((rows * SIDE, columns * SIDE), pixels.dtype)
+    padded[: pixels.shape[0], : pixels.shape[1]] = pixels
+    halves = padded.reshape(rows, 2, SIDE // 2, columns, SIDE).transpose(0, 3, 1, 2, 4)
+    return halves.reshape(-1, SIDE * SIDE // 2)
+
+
+def _texel_lines(
+    textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains
+) -> tuple[NDArray[np.int64], int]:
+    """Distinct 128-byte lines that each warp's texels lie in, (warps,), and of the whole frame; bytes of RGB8 rows."""
+    mapped = textures >= 0
+    line = np.zeros(textures.shape, np.int64)
+    if mapped.any():
+        level = chains.levels[textures[mapped], 0].astype(np.int64)
+        texel = np.floor(np.mod(uvs[mapped], 1.0) * level[:, 1:]).astype(np.int64)
+        first = (level[:, 0] + texel[:, 1] * level[:, 1] + texel[:, 0]) * TEXEL_BYTES
+        line[mapped] = 1 + first // LINE_BYTES
+    warps = np.sort(_by_warp(line), axis=1)
+    new = np.diff(warps, axis=1, prepend=0) != 0
+    return new.sum(axis=1), len(np.unique(line[mapped]))
