@@ -7,9 +7,10 @@ its own box are looked at. The counts are those that ``stamps`` counts by execut
 from typing import NamedTuple
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
@@ -22,7 +23,7 @@ from simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
 from simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from simulator.stages.fatahalian2009.stamps import StampShape
 
-PARTS = 16  # pieces of work for each thread
+SMALLEST_PART = 1024  # polygons
 
 
 class SampleCount(NamedTuple):
@@ -52,26 +53,20 @@ def count_tests(
     shape : StampShape
         One level.
     """
-    parts = PARTS * get_num_threads()
+    parts = parts_of(len(polygons.vertices), SMALLEST_PART)
     counts = np.zeros((parts, 2), np.int64)
-    _count_parallel(polygons.vertices, width, height, offsets, shape, counts)
+    for_parts(_count, parts, polygons.vertices, width, height, offsets, shape, counts)
     tests, hits = counts.sum(axis=0).tolist()
     return SampleCount(tests, hits)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _count_parallel(vertices, width, height, offsets, shape, counts):
-    for part in prange(len(counts)):
-        _count(vertices, part, width, height, offsets, shape, counts)
-
-
 @njit(cache=True, nogil=True)
-def _count(vertices, part, width, height, offsets, shape, counts):
+def _count(part, parts, vertices, width, height, offsets, shape, counts):
     """Count the polygons of one part; edges are set up only where a sample lies in the box, or stamps are chosen."""
     edges, boxes, depths, snapped = new_setup()
     stamps = 0
     hits = 0
-    for p in range(part * len(vertices) // len(counts), (part + 1) * len(vertices) // len(counts)):
+    for p in range(part * len(vertices) // parts, (part + 1) * len(vertices) // parts):
         snap(vertices[p], boxes, snapped)
         x0, y0, x1, y1 = pixel_box(boxes, width, height)
         if x1 < x0 or y1 < y0:
