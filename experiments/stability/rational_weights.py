@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-SIZE = 96  # pixels a side of the screen
+SIZE = 40  # pixels a side of the screen
 SQUARE = 0.8  # side of the patch over the screen's
-WEIGHTS = tuple(10.0**-k for k in range(13))
+WEIGHTS = tuple(10.0**-k for k in range(7))
+DEPTHS = (7, 9, 11)  # halvings at most: 14 would take minutes, for all sub-patches are split along the edge too
 TOLERANCE = 0.1  # of a boundary, relative
 CURES = ("as given", "balanced")
 
@@ -35,33 +36,36 @@ def patch(weight: float, *, balanced: bool = False) -> NDArray[np.float32]:
     column = np.array([weight, 1.0, 1.0, 1.0])
     if balanced:
         column = balance(column)
-    return (points.reshape(1, 4, 4, 4) * column[:, None]).reshape(1, 16, 4).astype(np.float32)
+    weighted: NDArray[np.float32] = (points.reshape(1, 4, 4, 4) * column[:, None]).astype(np.float32)
+    return weighted.reshape(1, 16, 4)
 
 
 def balance(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights (4,) of the same cubic that leaves both ends equally fast; the largest is 1."""
     alpha = np.sqrt(weights[2] / weights[3] * weights[0] / weights[1])
     scaled: NDArray[np.float64] = weights * alpha ** np.arange(4)
-    return scaled / scaled.max()
+    scaled /= scaled.max()
+    return scaled
 
 
 @cache
-def frame(weight: float, *, balanced: bool = False) -> Split:
+def frame(weight: float, depth: int = DEPTHS[-1], *, balanced: bool = False) -> Split:
     """Split and dice the square."""
-    return split(patch(weight, balanced=balanced), np.eye(4), SIZE, SIZE)
+    return split(patch(weight, balanced=balanced), np.eye(4), SIZE, SIZE, max_depth=depth)
 
 
 @cache
-def missing(weight: float, *, balanced: bool = False) -> int:
+def missing(weight: float, depth: int = DEPTHS[-1], *, balanced: bool = False) -> int:
     """Pixels of the square that are not drawn."""
-    return int((draw(frame(1.0).grids, SIZE, SIZE).hits > 0).sum()) - int(
-        (draw(frame(weight, balanced=balanced).grids, SIZE, SIZE).hits > 0).sum()
-    )
+    whole, made = frame(1.0).grids, frame(weight, depth, balanced=balanced).grids
+    return int((draw(whole, SIZE, SIZE).hits > 0).sum() - (draw(made, SIZE, SIZE).hits > 0).sum())
 
 
-def boundary(*, balanced: bool = False) -> tuple[float | None, float | None]:
+def boundary(depth: int = DEPTHS[-1], *, balanced: bool = False) -> tuple[float | None, float | None]:
     """Weight that holds, and weight that breaks."""
-    return bisect(lambda weight: missing(weight, balanced=balanced) > 0, WEIGHTS[0], WEIGHTS[-1], tolerance=TOLERANCE)
+    return bisect(
+        lambda weight: missing(weight, depth, balanced=balanced) > 0, WEIGHTS[0], WEIGHTS[-1], tolerance=TOLERANCE
+    )
 
 
 def run(progress: Progress) -> Result:
@@ -72,12 +76,14 @@ def run(progress: Progress) -> Result:
     rows = [_row(weight, cure) for cure in CURES for weight in WEIGHTS]
     table = pd.DataFrame(rows)
     boundaries = [_boundary(table, cure) for cure in CURES]
-    shown = [table[(table.cure == cure) & (table.weight == WEIGHTS[3])].iloc[0] for cure in CURES]
-    notes = [
-        f"At a weight of {WEIGHTS[3]:g} the square takes {shown[0].subpatches} sub-patches of up to {shown[0].depth}"
-        f" halvings as given, and {shown[1].subpatches} of up to {shown[1].depth} balanced; with equal weights"
-        f" {rows[0]['subpatches']} of {rows[0]['depth']}."
+    boundaries += [
+        Boundary(f"micropolygon, at most {depth} halvings", "weight of one edge", "", *boundary(depth), "the same")
+        for depth in DEPTHS[:-1]
     ]
+    shown = [table[(table.cure == cure) & (table.weight == WEIGHTS[3])].iloc[0] for cure in CURES]
+    counts = ", ".join(f"{row.subpatches} sub-patches of up to {row.depth} halvings {row.cure}" for row in shown)
+    even = f"{rows[0]['subpatches']} of up to {rows[0]['depth']} with equal weights"
+    notes = [f"At a weight of {WEIGHTS[3]:g} the square takes {counts}; {even}."]
     figures = [
         Figure("missing", lambda path: _plot(table, path, "percent", "pixels of the square that are missing [%]")),
         Figure("subpatches", lambda path: _plot(table, path, "subpatches", "sub-patches")),
@@ -106,11 +112,11 @@ def _boundary(table: "pd.DataFrame", cure: str) -> Boundary:
     plain, cured = (table[(table.cure == c) & (table.weight == 1)].iloc[0].ms for c in CURES)
     given = cure == "as given"
     return Boundary(
-        f"micropolygon, weights {cure}",
+        f"micropolygon, at most {DEPTHS[-1]} halvings, weights {cure}",
         "weight of one edge",
         "",
         *boundary(balanced=not given),
-        f"sub-patches at that edge are dropped at the depth limit: up to {rows.percent.max():.0f} % of the square",
+        f"sub-patches at that edge are dropped at the depth limit, up to {rows.percent.max():.0f} % of the square",
         "balance the weights once a model" if given else "",
         f"no time in the frame: {cured:.4g} ms of bound and split and dicing, {plain:.4g} as given" if given else "",
     )
