@@ -1,0 +1,178 @@
+"""Auto: the proof that a schedule cannot end later, and the choice that rests on it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.auto import ERROR
+from models.bounds import asked_of, bounds, longest
+from models.events import EVENTS, MachineEvent
+from models.fidelity_bound import latest_end
+from models.fixed_function import PipeLaunch
+from models.launch import Launch
+from models.machine import list_machines, load_machine
+from models.price import price
+from models.schedule import loads, played, schedule, start_up
+from models.traffic import Traffic, traffic
+from simulator import simulate
+from simulator.pipelines import pipeline_names
+
+ROUNDING = 1 + 1e-9
+MACHINES = ("gtx280", "gtx480", "h200")
+COLUMNS = ("FP32", "SHARED", "CHAIN_LOAD", "LOAD_BYTES", "ATOMIC_REQUESTS")
+NOTHING = Traffic(0.0, 0.0, 1.0)
+
+
+def launch(units, block=64, dispatch="blocks", grid=None, **events):
+    """Describe units by event: one number for all, or one each."""
+    table = np.zeros((units, EVENTS))
+    for name, count in events.items():
+        table[:, MachineEvent[name]] = count
+    return Launch("stage", "kernel", grid or units, block, 16, 0, table, dispatch)
+
+
+def latest_cycles(what, machine, moved=NOTHING):
+    """Cycles of a launch that its schedule cannot exceed."""
+    asked = asked_of(what, machine, moved)
+    end = latest_end(loads(asked)).cycles + start_up(asked)
+    return asked.terms["launch"] + max(end, longest(asked.terms, asked.units))
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    units=st.integers(1, 1500),
+    seed=st.integers(0, 10**6),
+    dispatch=st.sampled_from(["blocks", "block_queue", "warp_queue"]),
+    machine=st.sampled_from(MACHINES),
+    block=st.sampled_from([32, 96, 512]),
+    spread=st.sampled_from([0.0, 1.0, 3.0]),
+)
+def test_no_schedule_ends_after_the_latest_end(units, seed, dispatch, machine, block, spread):
+    """Log-normal units in any mixture of terms: alike, unlike, and with rare giants."""
+    draw = np.random.default_rng(seed)
+    scale = 10.0 ** draw.uniform(0, 4, len(COLUMNS))
+    events = {name: scale[i] * draw.lognormal(0, spread, units) for i, name in enumerate(COLUMNS)}
+    what = launch(units, block, dispatch, 40, **events)
+    moved = Traffic(float(events["LOAD_BYTES"].sum()), 0.0, 1.0)
+    described = load_machine(machine)
+    assert schedule(what, described, moved).cycles <= latest_cycles(what, described, moved) * ROUNDING
+
+
+@settings(deadline=None, max_examples=60)
+@given(units=st.integers(1, 3000), seed=st.integers(0, 10**6), machine=st.sampled_from(MACHINES))
+def test_no_order_of_units_ends_after_the_latest_end(units, seed, machine):
+    """Sorted units: giants first or last, phases of one term and then of another."""
+    draw = np.random.default_rng(seed)
+    work = np.sort(draw.lognormal(6, 2, units))
+    what = launch(units, FP32=work[:: draw.choice([-1, 1])], CHAIN_LOAD=np.sort(draw.lognormal(1, 1, units)))
+    described = load_machine(machine)
+    assert schedule(what, described, NOTHING).cycles <= latest_cycles(what, described) * ROUNDING
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("column", COLUMNS)
+def test_of_many_equal_units_the_latest_end_is_the_schedule(machine, column):
+    """What is certain is known: no competition, and a tail of one unit in fifty."""
+    described = load_machine(machine)
+    what = launch(50 * 32 * described.sm.count, **{column: 5000})
+    assert latest_cycles(what, described) <= 1.03 * schedule(what, described, NOTHING).cycles
+
+
+def test_one_unit_is_known_to_the_cycle():
+    what, machine = launch(1, FP32=10**6, CHAIN_LOAD=50), load_machine("h200")
+    assert latest_cycles(what, machine) == pytest.approx(schedule(what, machine, NOTHING).cycles)
+
+
+@pytest.fixture(scope="module", params=pipeline_names())
+def frames(request):
+    """The contract's frame of each pipeline, priced on every machine that can launch it."""
+    run = simulate("teapot", request.param, "h200", width=96, height=72, fidelity="auto")
+    return [other for name in list_machines() if (other := _launched(run.on(name))) is not None]
+
+
+def _launched(run):
+    from models.errors import TilestampError
+
+    try:
+        price(run.launches, run.machine, "bounds")
+    except TilestampError:
+        return None
+    return run
+
+
+def test_the_bound_holds_for_every_launch_of_every_pipeline_on_every_machine(frames):
+    for run in frames:
+        for what, moved in zip(run.launches, traffic(run.launches, run.machine), strict=True):
+            if isinstance(what, Launch):
+                asked = asked_of(what, run.machine, moved)
+                latest = latest_cycles(what, run.machine, moved)
+                assert played(asked, loads(asked)).cycles <= latest * ROUNDING, (what.kernel, run.machine.name)
+
+
+@pytest.mark.parametrize("error", [0.01, 0.1, 0.4])
+def test_the_frame_is_within_the_error_of_its_schedule(frames, error):
+    for run in frames:
+        ours, full = (sum(t.cycles for t in price(run.launches, run.machine, f, error)) for f in ("auto", "schedule"))
+        assert full * (1 - error) <= ours <= full * ROUNDING, run.machine.name
+
+
+def test_a_launch_is_within_its_own_error_bound(frames):
+    for run in frames:
+        full = price(run.launches, run.machine, "schedule")
+        for ours, theirs in zip(run.timings, full, strict=True):
+            assert theirs.cycles * (1 - ours.error_bound) <= ours.cycles * ROUNDING, (ours.kernel, run.machine.name)
+
+
+def test_every_launch_says_what_was_chosen_and_why(frames):
+    for run in frames:
+        assert all(t.why and t.fidelity in ("bounds", "schedule") for t in run.timings)
+        assert run.stages["why"].str.len().min() > 0
+
+
+def test_a_launch_of_unlike_units_is_escalated_and_names_its_tail():
+    work = np.full(5000, 100.0)
+    work[-1] = 10**6
+    (got,) = price([launch(5000, FP32=work)], load_machine("gtx280"), "auto")
+    assert got.fidelity == "schedule"
+    assert got.why.startswith("tail")
+
+
+def test_a_launch_of_equal_units_stays_at_its_roofline():
+    what, machine = launch(132 * 32 * 50, FP32=5000), load_machine("h200")
+    (got,) = price([what], machine, "auto")
+    assert got.fidelity == "bounds"
+    assert got.cycles == bounds(what, machine, traffic([what], machine)[0]).cycles
+    assert got.error_bound <= ERROR
+
+
+def test_a_small_launch_stays_beside_a_large_one_and_is_escalated_alone():
+    machine = load_machine("gtx280")
+    work = np.full(300, 100.0)
+    work[-1] = 10**5
+    small, large = launch(300, FP32=work), launch(30 * 8 * 500, FP32=50000)
+    assert price([small], machine, "auto")[0].fidelity == "schedule"
+    got = price([small, large], machine, "auto")[0]
+    assert got.fidelity == "bounds"
+    assert got.why.startswith("small")
+    assert got.error_bound > ERROR
+
+
+def test_a_smaller_error_never_escalates_less(frames):
+    for run in frames:
+        counts = [
+            sum(t.fidelity == "schedule" for t in price(run.launches, run.machine, "auto", error))
+            for error in (0.3, 0.03, 0.003)
+        ]
+        assert counts == sorted(counts), run.machine.name
+
+
+def test_a_fixed_function_pass_is_exact_at_every_fidelity():
+    got = price([PipeLaunch("hardware", "draw", {"primitives": 1e6})], load_machine("gtx480"), "auto")[0]
+    assert got.error_bound == 0.0
+    assert got.why == "fixed function"
+
+
+def test_a_launch_without_work_is_known():
+    (got,) = price([launch(0, grid=1)], load_machine("h200"), "auto")
+    assert got.error_bound == 0.0
