@@ -103,7 +103,7 @@ def _weights(triangle, depths, t, sign, weights):
 
 
 @njit(cache=True, nogil=True)
-def draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
+def _draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
     """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; the arrays hold only those.
 
     Scratch is private, and no view of a shared array is made for a sample: counting its references would make threads
@@ -150,9 +150,10 @@ def draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
 
 
 @njit(cache=True, nogil=True)
-def _draw_part(part, parts, corners, depths, cull, grid, ids, depth, hits):
-    first, end = grid.rows * part // parts, grid.rows * (part + 1) // parts
-    draw(corners, depths, cull, grid, first, end, ids[first:end], depth[first:end], hits[first:end])
+def _draw_part(part, parts, corners, depths, cull, grid, first_row, ids, depth, hits):
+    first, end = ids.shape[0] * part // parts, ids.shape[0] * (part + 1) // parts
+    seen = (ids[first:end], depth[first:end], hits[first:end])
+    _draw(corners, depths, cull, grid, first_row + first, first_row + end, *seen)
 
 
 def exact_coverage(
@@ -191,7 +192,7 @@ def exact_coverage(
     homogeneous = np.ones((len(corners), 3, 3))
     homogeneous[:, :, :2] = corners
     deep = np.zeros((len(corners), 3)) if depths is None else np.ascontiguousarray(depths, np.float64)
-    return _cover(homogeneous, deep, Grid(offset[0], offset[1], 1.0, 1.0, width, height), cull=False)
+    return cover(homogeneous, deep, Grid(offset[0], offset[1], 1.0, 1.0, width, height))
 
 
 def exact_visibility(
@@ -223,7 +224,38 @@ def exact_visibility(
         Depth is z / w.
     """
     corners, depths = homogeneous_corners(positions, triangles, width, height)
-    return _cover(corners, depths, pixel_grid(width, height, offset), cull=cull_backfaces)
+    return visibility(corners, depths, width, height, offset=offset, cull_backfaces=cull_backfaces)
+
+
+def visibility(
+    corners: NDArray[np.float64],
+    depths: NDArray[np.float64],
+    width: int,
+    height: int,
+    *,
+    offset: tuple[float, float] = CENTRE,
+    cull_backfaces: bool = False,
+) -> Visible:
+    """As `exact_visibility`, of `homogeneous_corners` or `screen_corners`."""
+    return cover(corners, depths, pixel_grid(width, height, offset), cull=cull_backfaces)
+
+
+def screen_corners(
+    vertices: NDArray[np.floating], width: int, height: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (F, 3, 3) and depths (F, 3) as of `homogeneous_corners`, of triangles that are on the screen already.
+
+    Parameters
+    ----------
+    vertices : ndarray, (F, 3, 3)
+        x and y in pixels from the top left corner, depth from -1 to 1.
+    width, height : int
+        Pixels.
+    """
+    screen = vertices.astype(np.float64)
+    corners = np.ones_like(screen)
+    corners[..., 0], corners[..., 1] = 2.0 * screen[..., 0] - width, 2.0 * screen[..., 1] - height
+    return corners, np.ascontiguousarray(screen[..., 2])
 
 
 def homogeneous_corners(
@@ -242,8 +274,17 @@ def pixel_grid(width: int, height: int, offset: tuple[float, float] = CENTRE, si
     return Grid(offset[0] * step - width, offset[1] * step - height, step, step, width * side, height * side)
 
 
-def _cover(corners: NDArray[np.float64], depths: NDArray[np.float64], grid: Grid, *, cull: bool) -> Visible:
-    shape = (grid.rows, grid.columns)
+def cover(
+    corners: NDArray[np.float64],
+    depths: NDArray[np.float64],
+    grid: Grid,
+    *,
+    cull: bool = False,
+    rows: tuple[int, int] | None = None,
+) -> Visible:
+    """Draw to the rows from the first up to, not including, the second; to all of the grid if not given."""
+    first, end = rows or (0, grid.rows)
+    shape = (end - first, grid.columns)
     visible = Visible(np.full(shape, -1, np.int32), np.full(shape, np.inf), np.zeros(shape, np.int32))
-    for_parts(_draw_part, parts_of(grid.rows, _PART_ROWS), corners, depths, cull, grid, *visible)
+    for_parts(_draw_part, parts_of(end - first, _PART_ROWS), corners, depths, cull, grid, first, *visible)
     return visible

@@ -11,12 +11,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from simulator.parallel import for_parts
-from simulator.reference.coverage import CENTRE, draw, homogeneous_corners, pixel_grid
-from simulator.scenes.texture import TextureChains, add_bilinear, texture_chains
+from simulator.parallel import for_parts, parts_of
+from simulator.reference.coverage import CENTRE, cover, pixel_grid
+from simulator.scenes.texture import add_bilinear, texture_chains
 
 SIDE = 16  # samples along a pixel: where an edge runs along the rows, 1/32 of its contrast is left at most
-_BAND = 8  # rows of pixels drawn at once, which bounds the memory
+_BAND = 32  # rows of pixels drawn at once, which bounds the memory
 
 
 class Surface(NamedTuple):
@@ -24,9 +24,6 @@ class Surface(NamedTuple):
 
     Parameters
     ----------
-    corners : ndarray, (F, 3, 3), float64
-        See ``homogeneous_corners``.
-    depths : ndarray, (F, 3), float64
     planes : ndarray, (F, 6, 3), float64
         Factors of x, y and 1 in red, green, blue, u, v and 1 over w, each up to the same factor.
     texture_ids : ndarray, (F,), int32
@@ -34,8 +31,6 @@ class Surface(NamedTuple):
     background : ndarray, (3,), float64
     """
 
-    corners: NDArray[np.float64]
-    depths: NDArray[np.float64]
     planes: NDArray[np.float64]
     texture_ids: NDArray[np.int32]
     background: NDArray[np.float64]
@@ -80,18 +75,14 @@ def _pixel(surface, chains, ids, grid, j, i, side, first, sample, texel, out):
 
 
 @njit(cache=True, nogil=True)
-def _band(part, parts, surface, chains, cull, grid, side, image):  # noqa: ARG001 - for_parts hands it the number
-    """Draw and average rows of pixels ``part * _BAND`` and on."""
-    first, end = part * _BAND, min((part + 1) * _BAND, image.shape[0])
-    shape = ((end - first) * side, grid.columns)
-    ids, depth, hits = np.full(shape, -1, np.int32), np.full(shape, np.inf), np.zeros(shape, np.int32)
-    draw(surface.corners, surface.depths, cull, grid, first * side, end * side, ids, depth, hits)
+def _shade_part(part, parts, surface, chains, ids, grid, first_row, side, image):
+    """Shade and average a part of the rows of pixels, whose first row of samples is ``first_row`` of the grid."""
     sample, texel, mean = np.empty(5), np.empty(4, np.float32), np.empty(3)
-    for j in range(end - first):
+    for j in range(image.shape[0] * part // parts, image.shape[0] * (part + 1) // parts):
         for i in range(image.shape[1]):
-            _pixel(surface, chains, ids, grid, j, i, side, first * side, sample, texel, mean)
+            _pixel(surface, chains, ids, grid, j, i, side, first_row, sample, texel, mean)
             for c in range(3):
-                image[first + j, i, c] = mean[c]
+                image[j, i, c] = mean[c]
 
 
 def _planes(corners: NDArray[np.float64], attributes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -103,8 +94,8 @@ def _planes(corners: NDArray[np.float64], attributes: NDArray[np.float64]) -> ND
 
 
 def exact_picture(
-    positions: NDArray[np.float32],
-    triangles: NDArray[np.int32],
+    corners: NDArray[np.float64],
+    depths: NDArray[np.float64],
     colors: NDArray[np.floating],
     width: int,
     height: int,
@@ -119,18 +110,17 @@ def exact_picture(
 
     Parameters
     ----------
-    positions : ndarray, (V, 4), float32
-        Clip space.
-    triangles : ndarray, (F, 3), int32
-    colors : ndarray, (V, 3 or 4) or (F, 3, 3)
-        In [0, 1], of vertices or of the corners of triangles; alpha is not looked at.
+    corners, depths : ndarray, (F, 3, 3) and (F, 3), float64
+        See ``homogeneous_corners`` and ``screen_corners``.
+    colors : ndarray, (F, 3, 3)
+        RGB in [0, 1] of the corners.
     width, height : int
         Pixels.
     side : int
         Samples along a pixel; with 1, the picture of an exact rasterizer of one sample.
     background : (float, float, float)
-    uvs : ndarray, (V, 2), optional
-        Texture coordinates, v from the top row down; they wrap.
+    uvs : ndarray, (F, 3, 2), optional
+        Texture coordinates of the corners, v from the top row down; they wrap.
     texture : ndarray, (H, W, 4), uint8, optional
         Over all triangles; multiplies the colours.
     cull_backfaces : bool
@@ -140,22 +130,22 @@ def exact_picture(
     ndarray, (height, width, 3), float64
         In [0, 1], row 0 the top row.
     """
-    corners, depths = homogeneous_corners(positions, triangles, width, height)
-    shade = colors if colors.ndim == 3 else colors[triangles][..., :3]
     textured = texture is not None and uvs is not None
-    attributes = np.zeros((len(triangles), 3, 5))
-    attributes[:, :, :3] = shade
+    attributes = np.zeros((len(corners), 3, 5))
+    attributes[:, :, :3] = colors
     if textured:
-        attributes[:, :, 3:] = uvs[triangles]  # type: ignore[index]
+        attributes[:, :, 3:] = uvs
     surface = Surface(
-        corners,
-        depths,
         _planes(corners, attributes),
-        np.full(len(triangles), 0 if textured else -1, np.int32),
+        np.full(len(corners), 0 if textured else -1, np.int32),
         np.array(background, np.float64),
     )
-    chains: TextureChains = texture_chains((texture,) if texture is not None else (), mips=False)
+    chains = texture_chains((texture,) if texture is not None else (), mips=False)
     image = np.zeros((height, width, 3))
     grid = pixel_grid(width, height, CENTRE, side)
-    for_parts(_band, -(-height // _BAND), surface, chains, cull_backfaces, grid, side, image)
+    for first in range(0, height, _BAND):
+        end = min(first + _BAND, height)
+        seen = cover(corners, depths, grid, cull=cull_backfaces, rows=(first * side, end * side))
+        band = image[first:end]
+        for_parts(_shade_part, parts_of(len(band)), surface, chains, seen.ids, grid, first * side, side, band)
     return image
