@@ -129,7 +129,7 @@ def as_tiled(scene: Scene) -> NDArray[np.bool_]:
     vertices, _ = vertex_shading(mesh, np.eye(4), SIZE, SIZE, simt)
     drawable, _ = primitive_assembly(mesh, vertices, simt)
     count = np.zeros((SIZE, SIZE), np.int64)
-    barycentric_cover(vertices.screen, mesh.triangles[drawable], count)
+    barycentric_cover(vertices.screen, mesh.triangles[drawable], count, np.ones((SIZE, SIZE), np.float32))
     return count > 0
 
 

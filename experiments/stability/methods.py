@@ -98,7 +98,8 @@ def barycentrics(points: NDArray[np.float64], size: int) -> Cover:
     """Cover as ``tiled`` and ``per-primitive`` do: three float32 barycentrics between 0 and 1."""
     screen = _screen(points, size)
     count = np.zeros((size, size), np.int64)
-    barycentric_cover(screen, np.arange(len(screen), dtype=np.int32).reshape(-1, 3), count)
+    depth = np.ones((size, size), np.float32)
+    barycentric_cover(screen, np.arange(len(screen), dtype=np.int32).reshape(-1, 3), count, depth)
     return Cover(count[::-1] > 0, int(count.sum()))
 
 
@@ -177,8 +178,11 @@ def _screen(points: NDArray[np.float64], size: int) -> NDArray[np.float32]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
-    """Count the triangles of each pixel, (H, W) from the top; ``screen`` as Ru's vertex shading leaves it."""
+def barycentric_cover(screen: Any, triangles: Any, count: Any, depth: Any) -> None:
+    """Count the triangles of each pixel, (H, W) from the top, and keep the least depth of each.
+
+    ``screen`` is as Ru's vertex shading leaves it, and ``depth`` is cleared to 1.
+    """
     for t in range(len(triangles)):
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
         twice = area(x0, y0, x1, y1, x2, y2)
@@ -191,7 +195,9 @@ def barycentric_cover(screen: Any, triangles: Any, count: Any) -> None:
                     x0, y0, x1, y1, x2, y2, _ONE / twice, np.float32(x) + _HALF, np.float32(y) + _HALF
                 )
                 z = a * screen[triangles[t, 0], 2] + b * screen[triangles[t, 1], 2] + c * screen[triangles[t, 2], 2]
-                count[y, x] += inside(a, b, c) and z >= np.float32(0.0) and z < _ONE
+                if inside(a, b, c) and z >= np.float32(0.0) and z < _ONE:
+                    count[y, x] += 1
+                    depth[y, x] = min(depth[y, x], z)
 
 
 @njit(cache=True, nogil=True)
