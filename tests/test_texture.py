@@ -22,20 +22,20 @@ def image():
     return np.random.default_rng(1).integers(0, 256, (16, 8, 4), dtype=np.uint8)
 
 
-@pytest.mark.parametrize("tiled", [False, True])
+@pytest.mark.parametrize("tile", [0, TILE, 8])
 @pytest.mark.parametrize("point", POINTS)
-def test_bilinear_filtering_is_the_direct_evaluation(image, point, tiled):
+def test_bilinear_filtering_is_the_direct_evaluation(image, point, tile):
     out = np.zeros(4, np.float32)
     u, v = map(np.float32, point)
-    add_bilinear(texture_chains([image], tiled=tiled), 0, 0, u, v, np.float32(1.0), out)
+    add_bilinear(texture_chains([image], tile=tile), 0, 0, u, v, np.float32(1.0), out)
     assert out == pytest.approx(naive.bilinear(image / 255.0, *point), abs=2e-5)
 
 
-@pytest.mark.parametrize("tiled", [False, True])
+@pytest.mark.parametrize("tile", [0, TILE, 8])
 @pytest.mark.parametrize("lod", [0.0, 0.5, 1.25, 3.0, 4.0])
-def test_trilinear_filtering_is_the_direct_evaluation(image, lod, tiled):
+def test_trilinear_filtering_is_the_direct_evaluation(image, lod, tile):
     out = np.zeros(4, np.float32)
-    chains = texture_chains([image], tiled=tiled)
+    chains = texture_chains([image], tile=tile)
     add_trilinear(chains, 0, np.float32(lod), np.float32(0.31), np.float32(0.77), out)
     assert out == pytest.approx(naive.trilinear(image / 255.0, 0.31, 0.77, lod), abs=1e-5)
 
@@ -53,14 +53,14 @@ def test_coordinates_outside_wrap(image):
 
 def test_the_tiled_layout_holds_every_texel_once():
     image = np.arange(5 * 6 * 4, dtype=np.uint8).reshape(5, 6, 4)
-    chains = texture_chains([image], tiled=True, mips=False)
+    chains = texture_chains([image], tile=TILE, mips=False)
     for y in range(5):
         for x in range(6):
             assert chains.texels[texel_index(chains, 0, 0, x, y)] * 255.0 == pytest.approx(image[y, x])
 
 
 def test_a_storage_tile_is_contiguous(image):
-    chains = texture_chains([image], tiled=True)
+    chains = texture_chains([image], tile=TILE)
     indices = {texel_index(chains, 0, 0, x, y) for y in range(TILE) for x in range(TILE)}
     assert indices == set(range(TILE * TILE))
 

@@ -10,7 +10,7 @@ from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines.tiled import check_choices
 from simulator.scenes.scene import Scene
-from simulator.scenes.texture import texture_chains
+from simulator.scenes.texture import TILE, texture_chains
 from simulator.scenes.textured_mesh import geometry
 from simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
 from simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
@@ -35,6 +35,7 @@ def binned(
     order: Order = "api",
     texture_filter: Filter = "trilinear",
     texture_layout: str = "tiled",
+    texture_tile: int = TILE,
     cull_backfaces: bool = True,
     fragments_a_pixel: int = KEPT,
     opacity: float = 1.0,
@@ -50,6 +51,8 @@ def binned(
         Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
     texture_filter : {"nearest", "bilinear", "trilinear"}
     texture_layout : {"tiled", "rows"}
+    texture_tile : {2, 4, 8, 16}
+        Texels on a side of a storage tile.
     cull_backfaces : bool
         Cull triangles that face away.
     fragments_a_pixel : int
@@ -63,12 +66,15 @@ def binned(
         order=(order, ("api", "oit")),
         texture_filter=(texture_filter, tuple(FILTERS)),
         texture_layout=(texture_layout, ("tiled", "rows")),
+        texture_tile=(texture_tile, (2, 4, 8, 16)),
     )
     if fragments_a_pixel < 0 or not 0.0 <= opacity <= 1.0:
         raise TilestampError("fragments_a_pixel is 0 or more, opacity between 0 and 1")
     mesh = geometry(scene)
     textures = scene.mesh.textures if scene.mesh else ()
-    chains = texture_chains(textures, tiled=texture_layout == "tiled", mips=texture_filter == "trilinear")
+    chains = texture_chains(
+        textures, tile=texture_tile if texture_layout == "tiled" else 0, mips=texture_filter == "trilinear"
+    )
     opaque = order == "api"
 
     vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)

@@ -1,7 +1,8 @@
 """Textures as kernels read them: mip chains of all textures in one array, row-major or in small tiles; filters.
 
 Zhang keeps texels in "tile linear storage" so that a quad's texels share a cache line; his README gives no tile size,
-so 4x4 texels of 4 bytes (64 bytes, two sectors) are an assumption. Coordinates wrap (glTF's default, REPEAT).
+so 4x4 texels of 4 bytes (64 bytes, two sectors) are an assumption; ``zhang2025/texture_traffic`` compares 8x8.
+Coordinates wrap (glTF's default, REPEAT).
 Sizes need not be powers of two: a level is half its parent, rounded down, by a box filter whose last row or column
 of an odd parent is dropped.
 """
@@ -14,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 TEXEL_BYTES = 4
-TILE = 4  # texels on a side of a storage tile: 64 bytes
+TILE = 4  # texels on a side of a storage tile, by default: 64 bytes
 MAX_LEVELS = 16  # up to 32768 texels on a side
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
@@ -31,24 +32,24 @@ class TextureChains(NamedTuple):
         First texel, width, height of each level.
     counts : ndarray, (textures,), int32
         Levels of each texture.
-    tiled : int
-        1: tiles of 4x4 texels; 0: row after row.
+    tile : int
+        Texels on a side of a storage tile; 0: row after row.
     """
 
     texels: NDArray[np.float32]
     levels: NDArray[np.int32]
     counts: NDArray[np.int32]
-    tiled: int
+    tile: int
 
 
-def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tiled: bool = False, mips: bool = True) -> TextureChains:
+def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tile: int = 0, mips: bool = True) -> TextureChains:
     """Build the mip chains.
 
     Parameters
     ----------
     textures : sequence of ndarray, (H, W, 4), uint8
-    tiled : bool
-        Layout of the texels in memory.
+    tile : int
+        Texels on a side of a storage tile; 0: row after row.
     mips : bool
         Whether to build levels below the first.
     """
@@ -62,10 +63,10 @@ def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tiled: bool = False
         counts[t] = len(chain)
         for k, level in enumerate(chain):
             levels[t, k] = first, level.shape[1], level.shape[0]
-            parts.append(_stored(level, tiled))
+            parts.append(_stored(level, tile))
             first += len(parts[-1])
     texels = np.concatenate(parts) if parts else np.ones((1, 4), np.float32)
-    return TextureChains(texels, levels, counts, int(tiled))
+    return TextureChains(texels, levels, counts, tile)
 
 
 def _chain(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
@@ -80,14 +81,14 @@ def _chain(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
     return chain
 
 
-def _stored(level: NDArray[np.float32], tiled: bool) -> NDArray[np.float32]:
+def _stored(level: NDArray[np.float32], tile: int) -> NDArray[np.float32]:
     """Lay out a level's texels in memory order, (n, 4)."""
-    if not tiled:
+    if tile == 0:
         return level.reshape(-1, 4)
-    rows, columns = (-(-size // TILE) for size in level.shape[:2])
-    padded = np.zeros((rows * TILE, columns * TILE, 4), np.float32)
+    rows, columns = (-(-size // tile) for size in level.shape[:2])
+    padded = np.zeros((rows * tile, columns * tile, 4), np.float32)
     padded[: level.shape[0], : level.shape[1]] = level
-    return padded.reshape(rows, TILE, columns, TILE, 4).swapaxes(1, 2).reshape(-1, 4)
+    return padded.reshape(rows, tile, columns, tile, 4).swapaxes(1, 2).reshape(-1, 4)
 
 
 @njit(cache=True, nogil=True)
@@ -97,10 +98,11 @@ def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
     width = chains.levels[texture, level, 1]
     x = x % width
     y = y % chains.levels[texture, level, 2]
-    if chains.tiled == 0:
+    side = chains.tile
+    if side == 0:
         return first + y * width + x
-    tile = (y // TILE) * ((width + TILE - 1) // TILE) + x // TILE
-    return first + tile * TILE * TILE + (y % TILE) * TILE + x % TILE
+    tile = (y // side) * ((width + side - 1) // side) + x // side
+    return first + tile * side * side + (y % side) * side + x % side
 
 
 @njit(cache=True, nogil=True)
