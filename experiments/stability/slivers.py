@@ -21,7 +21,7 @@ from reports.maps import value_maps
 ANGLES = 12  # from 0 to 90 degrees
 PLACES = 12
 CELL = 16  # pixels: no sliver touches another's
-SIZE = CELL * ANGLES
+SIZE = 256  # pixels, a power of two, so that clip coordinates are exact; the rows above the cells stay empty
 LENGTH = 12.0  # pixels
 ASPECTS = tuple(4.0**k for k in range(9))
 WRONG = 0.25  # share of the samples from which we say that it breaks
@@ -69,7 +69,7 @@ def slivers(aspect: float) -> NDArray[np.float64]:
 def by_angle(method: Method, aspect: float) -> NDArray[np.float64]:
     """Wrong samples by right ones, for each angle."""
     right, ours = _exact(aspect), method(slivers(aspect), SIZE).mask
-    wrong, covered = ((m.reshape(ANGLES, -1)).sum(axis=1) for m in (right != ours, right))
+    wrong, covered = (m[: CELL * ANGLES].reshape(ANGLES, -1).sum(axis=1) for m in (right != ours, right))
     share: NDArray[np.float64] = wrong / np.maximum(covered, 1)
     return share
 
