@@ -142,7 +142,8 @@ def _grouped(asked: Demand) -> tuple[NDArray[np.float64], NDArray[np.float64], N
 def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple[float, float, int]:
     """Play all units; return the end, the start of the last unit (cycles), and the SMs that got any.
 
-    ``ends[s, p]`` is the reading of SM s's own clock at which the unit in place p ends, infinite where it is free.
+    ``ends[s, p]`` is the reading of SM s's own clock at which the unit in place p ends, infinite where it is free;
+    ``soonest[s]`` is the place of the first one, ``vacancies[s]`` a stack of its ``free[s]`` free places.
     ``now`` is unstretched time, ``time`` is real; ``wake[s]`` is the ``now`` of the next end on SM s, and ``first``
     a tournament tree over it.
     """
@@ -150,6 +151,10 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
     ends = np.full((sms, max(1, places.max())), np.inf)
     unit = np.zeros(ends.shape, np.int64)
     free = places.copy()
+    vacancies = np.zeros(ends.shape, np.int64)
+    for sm_ in range(sms):
+        vacancies[sm_, : places[sm_]] = np.arange(places[sm_])[::-1]
+    soonest = np.zeros(sms, np.int64)
     load = np.zeros(sms)  # S of each SM
     clock = np.zeros(sms)  # its own clock, at ``read``
     read = np.zeros(sms)
@@ -182,9 +187,11 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
         clock[s] += (now - read[s]) / max(1.0, load[s])
         read[s] = now
         if start:
-            place = _free_place(ends, s, places[s])
+            place = vacancies[s, free[s] - 1]
             i = started
             ends[s, place] = clock[s] + alone[i]
+            if ends[s, place] < ends[s, soonest[s]]:
+                soonest[s] = place
             unit[s, place] = i
             started += 1
             last_start = time
@@ -192,9 +199,11 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
             free[s] -= 1
             vacant -= 1
         else:
-            place = _next_end(ends, s, places[s])
+            place = soonest[s]
             i = unit[s, place]
             ends[s, place] = np.inf
+            soonest[s] = _next_end(ends, s, places[s])
+            vacancies[s, free[s]] = place
             ended += 1
             _change(s, i, -1.0, sm, chip, alone, load, server, chip_load)
             free[s] += 1
@@ -202,7 +211,7 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
             freed = s
         if free[s] == places[s]:  # empty: leave no rounding behind
             load[s] = 0.0
-        left = ends[s, _next_end(ends, s, places[s])] - clock[s]
+        left = ends[s, soonest[s]] - clock[s]
         wake[s] = now + max(0.0, left) * max(1.0, load[s])
         _replay(first, wake, leaves, s)
     return time, last_start, min(len(alone), int(np.count_nonzero(places)))
@@ -231,15 +240,6 @@ def _next_end(ends: Any, s: int, places: int) -> int:
         if ends[s, p] < ends[s, best]:
             best = p
     return best
-
-
-@njit(cache=True, nogil=True)
-def _free_place(ends: Any, s: int, places: int) -> int:
-    """Lowest free place of SM s."""
-    for p in range(places):
-        if ends[s, p] == np.inf:
-            return p
-    return -1
 
 
 @njit(cache=True, nogil=True)

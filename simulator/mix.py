@@ -38,7 +38,7 @@ _ABOUT = {"provenance", "source", "lanes"}
 _COLUMNS = {event.name.lower(): event for event in MachineEvent}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KernelMix:
     """Prices of one kernel's events.
 
@@ -58,6 +58,7 @@ class KernelMix:
     prices: dict[str, dict[str, Any]]
     provenance: dict[str, tuple[str, str]]
 
+    @cache  # noqa: B019 - mixes are read once and kept
     def matrix(self, events: type[IntEnum], warp: int) -> NDArray[np.float64]:
         """Prices as a matrix, (len(events), len(MachineEvent)): ``machine_events = work @ matrix``."""
         matrix = np.zeros((len(events), EVENTS))
@@ -116,7 +117,7 @@ class Mix:
             block=work.block,
             registers=kernel.registers,
             shared_bytes=work.shared_bytes + kernel.shared_bytes,
-            events=work.table.astype(np.float64) @ kernel.matrix(work.events, warp),
+            events=(kernel.matrix(work.events, warp).T @ work.table.T.astype(np.float64)).T,  # by column, as it is read
             dispatch=work.dispatch,
             streams=work.streams,
             atomic_requests=work.atomic_requests,
