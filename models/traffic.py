@@ -3,9 +3,9 @@
 Without a cache every byte of every transaction goes to DRAM. With an L2, a launch fetches the part of each buffer's
 footprint that no earlier launch of the frame left there; bytes beyond the footprint are read again and miss only by
 the share in which all footprints of the launch together (or the span that a stream names) exceed the cache. Stores
-stay in the cache until something pushes them out (write-back), and the launch that does so pays. What is in the cache is
-kept by buffer, least recently used first: a frame's launches hand whole buffers to each other, so buffers and not lines
-are what is reused.
+stay in the cache until something pushes them out (write-back), and the launch that does so pays. What is in the cache
+is kept by buffer, least recently used first: a frame's launches hand whole buffers to each other, so buffers and not
+lines are what is reused.
 """
 
 from __future__ import annotations

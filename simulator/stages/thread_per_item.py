@@ -1,6 +1,7 @@
 """Kernels of one thread an item, the same work for each: vertex shading, copies, clears. Their work table by block."""
 
 from enum import IntEnum
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +95,7 @@ def thread_per_item(
     return Work(stage, kernel, ThreadEvent, table, len(table), block, streams=tuple(streams))
 
 
+@cache
 def record_transactions(access: Access, simt: Simt) -> tuple[int, int]:
     """Transactions of a whole warp on consecutive records, and their bytes."""
     count = total = 0

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from models.launch import Stream
 from models.simt import Simt
-from simulator.stages.ru2016.per_primitive_walk import BLOCK, DEPTH_SCALE, FAR, PerPrimitiveEvent, walk
+from simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
+from simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
 from simulator.stages.ru2016.tile_lists import SECTOR_BYTES
 from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
 from simulator.work import Work
@@ -87,10 +88,15 @@ def per_primitive_raster(
     blocks = max(1, -(-len(drawable) // BLOCK))
     events = np.zeros((blocks, len(PerPrimitiveEvent)), np.int64)
     requests = np.zeros(width * height // 8 + 1, np.int64)
+    resident = simt.sms * (THREADS_AN_SM // simt.warp)
     walk(
-        screen, triangles, drawable, culling, simt.warp, int(simt.atomic_merge), simt.sms * (THREADS_AN_SM // simt.warp),
-        visible, depth, *race, requests, events,
-    )  # fmt: skip
+        (screen, triangles, drawable),
+        culling,
+        int(simt.atomic_merge),
+        walkers(resident, simt.warp),
+        (visible, depth, *race, requests),
+        events,
+    )
     _add_traffic(events, simt, textured)
     total = events.sum(axis=0)
     stored = int(total[PerPrimitiveEvent.WRITE_LANES]) * (WRITE_WORDS + (TEXTURE_WORDS if textured else 0))

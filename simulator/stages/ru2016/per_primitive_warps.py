@@ -1,0 +1,76 @@
+"""The warps of the per-primitive raster: what their blocks count, and where they stand."""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+BLOCK = 128  # threads
+
+
+class PerPrimitiveEvent(IntEnum):
+    """Events of one block."""
+
+    WARPS = 0
+    WARP_LANES = 1
+    CULLED = 2
+    BOX_STEPS = 3  # warp steps over the pixels of the boxes: one barycentric test each
+    SAMPLE_TESTS = 4  # lanes in them
+    SAMPLE_HITS = 5
+    ATOMIC = 6
+    ATOMIC_LANES = 7
+    ATOMIC_REQUESTS = 8
+    ATOMIC_CONFLICTS = 9
+    ATOMIC_DEPTH = 10
+    WRITES = 11  # warp steps in which a lane computes and writes its fragment
+    WRITE_LANES = 12
+    STORE_TRANSACTIONS = 13
+    STORE_BYTES = 14
+    LOAD_TRANSACTIONS = 15
+    LOAD_BYTES = 16
+    LONGEST = 17  # most steps of a warp: the dependent chain of the block
+    LONGEST_HITS = 18  # most steps of a warp in which a lane hits
+    LONGEST_WRITES = 19  # most steps of a warp in which a lane writes
+
+
+class Walkers(NamedTuple):
+    """The resident warps, W of L lanes.
+
+    Parameters
+    ----------
+    boxes : ndarray, (W, L, 5), int64
+        Of each lane: left, columns, top, rows, triangle.
+    shapes : ndarray, (W, L, 10), float32
+        Of each lane's triangle: corners, one over its area, depths.
+    place : ndarray, (W, 4), int64
+        Column and row that the warp is at, rows and lanes of the column.
+    present : ndarray, (W, L), int64
+        Those lanes.
+    seen : ndarray, (W, 3), int64
+        Steps, steps with a hit, steps with a write.
+    pixels, who, wins : ndarray, (L,), int64, int64, bool
+        Of each lane that hits now: its pixel, its number, whether it lowered the depth.
+    """
+
+    boxes: Any
+    shapes: Any
+    place: Any
+    present: Any
+    seen: Any
+    pixels: Any
+    who: Any
+    wins: Any
+
+
+def walkers(warps: int, lanes: int) -> Walkers:
+    """Make room for the resident warps."""
+    return Walkers(
+        np.zeros((warps, lanes, 5), np.int64),
+        np.zeros((warps, lanes, 10), np.float32),
+        np.zeros((warps, 4), np.int64),
+        np.zeros((warps, lanes), np.int64),
+        np.zeros((warps, 3), np.int64),
+        np.zeros(lanes, np.int64),
+        np.zeros(lanes, np.int64),
+        np.zeros(lanes, np.bool_),
+    )
