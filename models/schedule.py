@@ -152,8 +152,8 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
     unit = np.zeros(ends.shape, np.int64)
     free = places.copy()
     vacancies = np.zeros(ends.shape, np.int64)
-    for sm_ in range(sms):
-        vacancies[sm_, : places[sm_]] = np.arange(places[sm_])[::-1]
+    for each in range(sms):
+        vacancies[each, : places[each]] = np.arange(places[each])[::-1]
     soonest = np.zeros(sms, np.int64)
     load = np.zeros(sms)  # S of each SM
     clock = np.zeros(sms)  # its own clock, at ``read``
