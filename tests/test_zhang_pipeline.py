@@ -193,3 +193,40 @@ def test_a_graph_takes_its_longest_path():
     assert as_graph(nodes, 1.0, 0.0).gpu_us == 9.0
     assert on_stream(nodes, 1.0, 2.0).gpu_us == 11.0
     assert on_stream(nodes, 1.0, 2.0).cpu_us == 13.0
+
+
+def test_nodes_bound_by_memory_share_it():
+    alone = as_graph([Node("a", 10, shares=True)], 0.0, 0.0)
+    both = as_graph([Node("a", 10, shares=True), Node("b", 4, shares=True), Node("c", 10)], 0.0, 0.0)
+    assert alone.gpu_us == 10.0
+    assert both.gpu_us == pytest.approx(14.0)  # b ends at 8, a does 6 more by itself
+    assert both.path == ("a",)
+
+
+def test_a_node_before_what_it_waits_for_is_refused():
+    with pytest.raises(KeyError):
+        as_graph([Node("a", 1, ("b",)), Node("b", 1)], 0.0, 0.0)
+
+
+def test_blocks_without_a_primitive_run_the_ballots_too(scene, matrix):
+    """The original launches blocks for at least 2,048 compacted primitives, not knowing how many there are."""
+    frame = draw(scene, matrix)
+    assert work(frame, "TriangleSetup").grid == work(frame, "PrimitiveBinning").grid == 8
+    assert work(frame, "PrimitiveBinning").counts()["WARPS"] == 8 * 8
+    assert work(frame, "TriangleSetup").counts()["WARPS"] < 8 * 8
+
+
+def test_a_block_of_the_fine_rasterizer_waits_for_its_slowest_tile(scene, matrix):
+    counts = work(draw(scene, matrix), "FineRasterizer").counts()
+    assert counts["EARLY_Z_STEPS"] / 4 <= counts["CRITICAL_Z_STEPS"] <= counts["EARLY_Z_STEPS"]
+
+
+@pytest.mark.parametrize("tile", [2, 8])
+def test_the_size_of_a_storage_tile_changes_no_pixel(scene, matrix, tile):
+    assert (draw(scene, matrix).image == draw(scene, matrix, texture_tile=tile).image).all()
+
+
+def test_stores_leave_an_sm_at_their_own_rate():
+    """Words 140 bytes apart take a sector a lane, and half a sector leaves an SM in a clock."""
+    machine = load_machine("ga104")
+    assert machine.memory.l1_write_bytes_per_clock < machine.memory.l1_bytes_per_clock / 8

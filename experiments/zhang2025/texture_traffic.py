@@ -86,7 +86,7 @@ def run(progress: Callable[[str], None]) -> Result:
             f"rows: 8x8 / rows lies between {min(wide):.2f} and {max(wide):.2f}, so if sectors are what his layout "
             "saves, his tiles are at most 4 texels wide."
         ),
-        "Two texels a pixel or more without mip levels: tiles lose, since a warp's texels lie further apart than a tile.",
+        "Two texels a pixel or more, without mip levels: tiles lose, since texels of a row lie in different ones.",
     ]
     source = "Zhang 2025 names an optimized tile linear storage, without figures"
     return Result(

@@ -3,14 +3,31 @@
 After optimization a thread stores one 4-byte word, before it four single bytes.
 """
 
+from typing import Any
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from models.simt import Simt
+from simulator.parallel import for_parts, parts_of
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work
 
 BLOCK = 256  # threads
+_ZERO = np.float32(0.0)
+_ONE = np.float32(1.0)
+_FULL = np.float32(255.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _streaming(part: int, parts: int, target: Any, image: Any) -> None:
+    """Convert a part of the rows, the last one first."""
+    rows = len(target)
+    for y in range(part * rows // parts, (part + 1) * rows // parts):
+        for x in range(target.shape[1]):
+            for c in range(3):
+                image[rows - 1 - y, x, c] = np.uint8(min(max(target[y, x, c], _ZERO), _ONE) * _FULL)
 
 
 def streaming_to_frame_buffer(
@@ -31,7 +48,8 @@ def streaming_to_frame_buffer(
         Row 0 is the top row.
     work : Work
     """
-    image = (np.clip(target[::-1, :, :3], 0.0, 1.0) * np.float32(255.0)).astype(np.uint8)
+    image = np.empty((*target.shape[:2], 3), np.uint8)
+    for_parts(_streaming, parts_of(len(target)), target, image)
     loads = (Access("target", 16, 1, 16),)
     stores = (Access("window", 4, 1) if optimized else Access("window", 4, 4, 1),)
     kernel = "StreamingToFrameBuffer" if optimized else "StreamingToFrameBuffer_before"
