@@ -26,6 +26,13 @@ def describe(name: str) -> str:
     return (import_module(_module(name)).__doc__ or "").strip().splitlines()[0]
 
 
+def describe_folder(folder: str) -> str:
+    """First line of the docstring of a folder of experiments; its name where there is none."""
+    if not (FOLDER / folder / "__init__.py").is_file():
+        return folder
+    return (import_module(f"experiments.{folder}").__doc__ or folder).strip().splitlines()[0]
+
+
 def load_experiment(name: str) -> Experiment:
     """The function that runs the experiment ``name``."""
     experiment: Experiment = import_module(_module(name)).run

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from experiments.registry import describe_folder
 from experiments.result import Cell, Result
 from models.compile_cache import source_digest
 from reports.page import write_page
@@ -44,6 +45,11 @@ def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)
     return target
+
+
+def _group(result: Result) -> str:
+    """Folder of the experiment: the part of its name before the first dash."""
+    return result_folder(result).split("-")[0]
 
 
 def result_folder(result: Result) -> str:
@@ -85,7 +91,9 @@ def write_index(results: Sequence[Result], folder: Path) -> Path:
 def _section(result: Result) -> dict[str, Any]:
     """One result for the page."""
     return {
-        "name": result.name,
+        "name": result_folder(result),
+        "group": _group(result),
+        "about": describe_folder(_group(result)),
         "title": result.title,
         "source": result.source,
         "warnings": result.warnings,

@@ -14,11 +14,14 @@ TEMPLATE = """<!doctype html>
  th { border-bottom: 1px solid #999; }
  td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
  tr.fitted td { color: #888; font-style: italic; } tr.missed td.error { color: #b00020; font-weight: 600; }
+ nav ul { margin: .2rem 0 .8rem; padding-left: 1.2rem; } nav p { margin: .2rem 0; } a { color: #1f5aa6; }
  img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
  footer { color: #777; font-size: 12px; margin-top: 3rem; }
 </style></head><body>
 <h1>{{ title }}</h1>
 <p>{{ introduction }}</p>
+<nav>{% for group in results | groupby("group") %}<p><b>{{ group.list[0].about }}</b></p><ul>{% for result in group.list %}
+<li><a href="#{{ result.name }}">{{ result.title }}</a></li>{% endfor %}</ul>{% endfor %}</nav>
 {% for result in results %}
 <h2 id="{{ result.name }}">{{ result.title }}</h2>
 <p class="note">{{ result.source }}</p>
@@ -43,7 +46,7 @@ def write_page(path: Path, title: str, introduction: str, results: Sequence[dict
     path : Path
         HTML file to write.
     results : sequence of dict
-        Each with name, title, source, warnings, columns, rows (cells and marks), error_column, figures (paths relative
+        Each with name, group and what the group is about, title, source, warnings, columns, rows (cells and marks), error_column, figures (paths relative
         to the page) and notes.
     """
     from jinja2 import Environment
