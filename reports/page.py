@@ -20,7 +20,8 @@ TEMPLATE = """<!doctype html>
 </style></head><body>
 <h1>{{ title }}</h1>
 <p>{{ introduction }}</p>
-<nav>{% for group in results | groupby("group") %}<p><b>{{ group.list[0].about }}</b></p><ul>{% for result in group.list %}
+<nav>{% for group in results | groupby("group") %}<p><b>{{ group.list[0].about }}</b></p><ul>
+{% for result in group.list %}
 <li><a href="#{{ result.name }}">{{ result.title }}</a></li>{% endfor %}</ul>{% endfor %}</nav>
 {% for result in results %}
 <h2 id="{{ result.name }}">{{ result.title }}</h2>
@@ -46,8 +47,8 @@ def write_page(path: Path, title: str, introduction: str, results: Sequence[dict
     path : Path
         HTML file to write.
     results : sequence of dict
-        Each with name, group and what the group is about, title, source, warnings, columns, rows (cells and marks), error_column, figures (paths relative
-        to the page) and notes.
+        Each with name, group and what the group is about, title, source, warnings, columns, rows (cells and marks),
+        error_column, figures (paths relative to the page) and notes.
     """
     from jinja2 import Environment
 
