@@ -90,7 +90,7 @@ class _Rough:
         if self.asked is None:
             return replace(self.timing, why="fixed function", error_bound=0.0)
         share = (self.most - self.timing.cycles) / frame
-        why = f"within {bound:.1%}" if bound <= error else f"small: within {share:.1%} of the frame"
+        why = f"at most {bound:.1%} low" if bound <= error else f"small: at most {share:.1%} of the frame low"
         return replace(self.timing, why=why, error_bound=bound)
 
     def escalate(self) -> Timing:
