@@ -7,7 +7,8 @@ import pytest
 
 from models.errors import TilestampError
 from models.launch_graph import Node, as_graph, on_stream
-from models.machine import load_machine
+from models.machine import altered, load_machine
+from models.price import price
 from models.simt import Simt
 from simulator.mix import load_mix
 from simulator.pipelines.binned import binned
@@ -226,7 +227,18 @@ def test_the_size_of_a_storage_tile_changes_no_pixel(scene, matrix, tile):
     assert (draw(scene, matrix).image == draw(scene, matrix, texture_tile=tile).image).all()
 
 
-def test_stores_leave_an_sm_at_their_own_rate():
+def test_depth_stepped_within_a_quad_leaves_holes_and_a_bias_cures_them(scene, matrix):
+    """One-pixel holes, as in the original: the ROP's depth is a unit beyond the one that early z stored."""
+    direct, stepped, biased = (draw(scene, matrix, fragment_depth=way) for way in ("direct", "stepped", "biased"))
+    lost = (direct.triangle_ids >= 0) & (stepped.triangle_ids < 0)
+    assert stepped.facts["holes"] == lost.sum() > 0
+    assert direct.facts["holes"] == biased.facts["holes"] == 0
+    assert (biased.image == direct.image).all()
+
+
+def test_stores_that_scatter_leave_an_sm_at_their_own_rate(scene, matrix):
     """Words 140 bytes apart take a sector a lane, and half a sector leaves an SM in a clock."""
     machine = load_machine("ga104")
-    assert machine.memory.l1_write_bytes_per_clock < machine.memory.l1_bytes_per_clock / 8
+    launch = load_mix("binned", "8.6").launch(work(draw(scene, matrix), "TriangleSetup"), 32)
+    gathered = altered(machine, {"memory.l1_write_bytes_per_clock": 0.0}, "assumed", "a test")
+    assert price([launch], machine)[0].cycles > 1.5 * price([launch], gathered)[0].cycles

@@ -27,6 +27,7 @@ PAIRS: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "trilinear filtering": ("binned", "ga104", {"texture_filter": "bilinear"}, {"texture_filter": "trilinear"}),
     "ambient occlusion": ("tiled", "ga104", {"ssao": False}, {"ssao": True}),
     "transparency": ("binned", "ga104", {}, {"order": "oit", "opacity": 0.5, "cull_backfaces": False}),
+    "depth without steps": ("binned", "ga104", {"fragment_depth": "stepped"}, {"fragment_depth": "direct"}),
     "protected writes": ("per-primitive", "ga104", {"race": True}, {"race": False}),
 }
 

@@ -13,12 +13,13 @@ from simulator.scenes.scene import Scene
 from simulator.scenes.texture import TILE, texture_chains
 from simulator.scenes.textured_mesh import geometry
 from simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
+from simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
 from simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
 from simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, pixel_shader
 from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from simulator.stages.zhang2025.primitive_binning import primitive_binning
 from simulator.stages.zhang2025.primitive_compaction import primitive_compaction
-from simulator.stages.zhang2025.rop import KEPT, Order, rop
+from simulator.stages.zhang2025.rop import KEPT, FragmentDepth, Order, rop
 from simulator.stages.zhang2025.rop_block import RopEvent
 from simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
 from simulator.stages.zhang2025.triangle_setup import triangle_setup
@@ -38,6 +39,7 @@ def binned(
     texture_tile: int = TILE,
     cull_backfaces: bool = True,
     fragments_a_pixel: int = KEPT,
+    fragment_depth: FragmentDepth = "direct",
     opacity: float = 1.0,
     optimized: bool = True,
 ) -> Frame:
@@ -57,6 +59,9 @@ def binned(
         Cull triangles that face away.
     fragments_a_pixel : int
         How many a pixel can keep (the original: 4); 0 for all.
+    fragment_depth : {"direct", "stepped", "biased"}
+        How the depth that goes to the last test is evaluated: as early z does; or stepped within a quad, as the
+        original did, which leaves one-pixel holes; or less 1e-4, its cure.
     opacity : float
         Multiplies every alpha.
     optimized : bool
@@ -67,6 +72,7 @@ def binned(
         texture_filter=(texture_filter, tuple(FILTERS)),
         texture_layout=(texture_layout, ("tiled", "rows")),
         texture_tile=(texture_tile, (2, 4, 8, 16)),
+        fragment_depth=(fragment_depth, tuple(FRAGMENT_DEPTHS)),
     )
     if fragments_a_pixel < 0 or not 0.0 <= opacity <= 1.0:
         raise TilestampError("fragments_a_pixel is 0 or more, opacity between 0 and 1")
@@ -89,8 +95,9 @@ def binned(
         texture_filter=texture_filter, opacity=opacity, optimized=optimized,
     )  # fmt: skip
     target, depth, winners, resolve = rop(
-        data, tiles, fragments, stream, simt, order=order, limit=fragments_a_pixel, optimized=optimized
-    )
+        data, tiles, fragments, stream, simt, order=order, fragment_depth=fragment_depth, limit=fragments_a_pixel,
+        optimized=optimized,
+    )  # fmt: skip
     image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
 
     return Frame(
@@ -104,5 +111,6 @@ def binned(
             "quads": len(stream.entries),
             "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
             "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
+            "holes": resolve.total(RopEvent.HOLES),
         },
     )

@@ -16,7 +16,7 @@ from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
 from simulator.stages.zhang2025.coarse_rasterizer import TileQueues
-from simulator.stages.zhang2025.depth import DEPTH_STEPS
+from simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
 from simulator.stages.zhang2025.fine_rasterizer import TileFragments
 from simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, FragmentStream
 from simulator.stages.zhang2025.rop_block import BLOCK_SIDE, RopEvent, resolve_block
@@ -25,6 +25,7 @@ from simulator.work import Work
 
 KEPT = 4  # fragments a pixel
 Order = Literal["api", "oit"]
+FragmentDepth = Literal["direct", "stepped", "biased"]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -42,14 +43,15 @@ def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _rop(
     part: int, parts: int, heads: Any, links: Any, quads: Any, colors: Any, masks: Any, queue: Any, planes: Any,
-    ids: Any, columns: int, warp: int, order: int, limit: int, target: Any, depth: Any, winners: Any, events: Any,
+    ids: Any, columns: int, warp: int, order: int, way: int, limit: int, target: Any, depth: Any, winners: Any,
+    events: Any,
 ) -> None:  # fmt: skip
     """Resolve a part of the blocks."""
     for block in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         left, bottom = block % columns * BLOCK_SIDE, block // columns * BLOCK_SIDE
         resolve_block(
             heads, links, quads, colors, masks, queue, planes, ids, left, bottom,
-            warp, order, limit, target, depth, winners, events[block],
+            warp, order, way, limit, target, depth, winners, events[block],
         )  # fmt: skip
 
 
@@ -61,6 +63,7 @@ def rop(
     simt: Simt,
     *,
     order: Order,
+    fragment_depth: FragmentDepth = "direct",
     limit: int,
     optimized: bool,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], Work]:
@@ -74,6 +77,8 @@ def rop(
     stream : FragmentStream
     simt : Simt
     order : {"api", "oit"}
+    fragment_depth : {"direct", "stepped", "biased"}
+        How the depth of a fragment is evaluated; early z is direct.
     limit : int
         Fragments a pixel can keep; 0 for all.
     optimized : bool
@@ -99,7 +104,8 @@ def rop(
     room = limit or max(1, int(np.diff(tiles.starts).max(initial=1)))
     for_parts(
         _rop, parts_of(len(events)), heads, links, stream.entries, stream.colors, fragments.masks, tiles.entries,
-        data.planes, data.ids, columns, simt.warp, 0 if order == "api" else 1, room, target, depth, winners, events,
+        data.planes, data.ids, columns, simt.warp, 0 if order == "api" else 1, FRAGMENT_DEPTHS[fragment_depth],
+        room, target, depth, winners, events,
     )  # fmt: skip
     _add_costs(events)
     total = events.sum(axis=0)

@@ -7,11 +7,9 @@ import numpy as np
 from numba import njit
 
 from simulator.stages.zhang2025.coarse_bin import TILE
-from simulator.stages.zhang2025.depth import depth_24_bit
-from simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
+from simulator.stages.zhang2025.depth import fragment_depth
 
 BLOCK_SIDE = 16  # threads
-_HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
 
 
@@ -30,12 +28,13 @@ class RopEvent(IntEnum):
     LOAD_BYTES = 9
     STORE_TRANSACTIONS = 10
     STORE_BYTES = 11
+    HOLES = 12  # pixels whose fragments all fail the depth test
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _gather(
     head: int, links: Any, quads: Any, masks: Any, queue: Any, planes: Any, ids: Any, bit: Any, x: int, y: int,
-    order: int, kept: Any, keys: Any, row: Any, lane: Any,
+    order: int, way: int, kept: Any, keys: Any, row: Any, lane: Any,
 ) -> int:  # fmt: skip
     """Walk one pixel's list; returns the fragments kept, sorted by key."""
     count = 0
@@ -45,7 +44,7 @@ def _gather(
         if masks[entry] & bit != np.uint64(0):
             if count < len(kept):
                 p = queue[entry]
-                z = depth_24_bit(evaluate(planes[p, DEPTH], np.float32(x) + _HALF, np.float32(y) + _HALF))
+                z = fragment_depth(planes[p], x, y, way)
                 key = np.int64(ids[p]) if order == 0 else -np.int64(z) * (1 << 32) + ids[p]
                 at = count
                 while at > 0 and (keys[at - 1, 0] > key or (keys[at - 1, 0] == key and keys[at - 1, 1] > p)):
@@ -83,7 +82,7 @@ def _resolve(kept: Any, keys: Any, count: int, colors: Any, ids: Any, order: int
 @njit(cache=True, nogil=True, error_model="numpy")
 def resolve_block(
     heads: Any, links: Any, quads: Any, colors: Any, masks: Any, queue: Any, planes: Any, ids: Any, left: int,
-    bottom: int, warp: int, order: int, limit: int, target: Any, depth: Any, winners: Any, row: Any,
+    bottom: int, warp: int, order: int, way: int, limit: int, target: Any, depth: Any, winners: Any, row: Any,
 ) -> None:  # fmt: skip
     """One block of 16x16 pixels, warp by warp."""
     height, width = heads.shape
@@ -102,7 +101,7 @@ def resolve_block(
             lane[0] = 0
             bit = np.uint64(1) << np.uint64(y % TILE * TILE + x % TILE)
             count = _gather(
-                heads[y, x], links, quads, masks, queue, planes, ids, bit, x, y, order, kept, keys, row, lane
+                heads[y, x], links, quads, masks, queue, planes, ids, bit, x, y, order, way, kept, keys, row, lane
             )
             winners[y, x] = _resolve(kept, keys, count, colors, ids, order, target[y, x], depth[y, x : x + 1])
             walked = max(walked, lane[0])
@@ -111,6 +110,7 @@ def resolve_block(
             if row is not None:
                 row[3] += lane[0]
                 row[6] += count
+                row[12] += count > 0 and winners[y, x] < 0
         if row is not None and live:
             row[0] += 1
             row[1] += live
