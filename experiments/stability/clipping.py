@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from experiments.result import Figure, Result
 from experiments.stability.boundary import Boundary, Scale, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, barycentric_cover, draw, plane_cover, stamp_cover
-from models.machine import load_machine
+from experiments.stability.methods import MACHINE, barycentric_cover, draw, machine, plane_cover, stamp_cover
 from reports.maps import value_maps
 from simulator.reference.coverage import exact_visibility
 from simulator.run import Run
@@ -125,7 +124,7 @@ def by_pipeline(pipeline: str, **options: Any) -> Callable[[Scene], NDArray[np.b
 
 def as_tiled(scene: Scene) -> NDArray[np.bool_]:
     """Pixels of ``tiled`` and ``per-primitive``: no clipping; what has a corner behind the eye is dropped."""
-    mesh, simt = geometry(scene), load_machine(MACHINE).simt
+    mesh, simt = geometry(scene), machine().simt
     vertices, _ = vertex_shading(mesh, np.eye(4), SIZE, SIZE, simt)
     drawable, _ = primitive_assembly(mesh, vertices, simt)
     count = np.zeros((SIZE, SIZE), np.int64)

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from experiments.result import Figure, Result
 from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE
-from models.machine import load_machine
+from experiments.stability.methods import MACHINE, machine
 from reports.plots import lines
 from simulator.stages.laine2011.exact import fma
 from simulator.stages.zhang2025.depth import DEPTH_STEPS, depth_24_bit
@@ -128,7 +127,7 @@ def _order(slack: int, name: str) -> Boundary:
 
 def _carrying_cost() -> str:
     """Price a word more in each fragment, written once and read once."""
-    memory = load_machine(MACHINE).memory
+    memory = machine().memory
     milliseconds = 2 * WORD * FULL_HD / (memory.dram_gb_per_s * memory.dram_efficiency * 1e6)
     return f"a word a fragment more is {milliseconds:.4f} ms of the {MACHINE}'s bandwidth for a screen of 1920 x 1080"
 

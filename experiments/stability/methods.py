@@ -6,13 +6,14 @@ is the method's own rounding, not its input's.
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from models.machine import load_machine
+from models.machine import Machine, load_machine
 from simulator import Run, simulate
 from simulator.reference.coverage import exact_coverage
 from simulator.scenes.scene import Scene
@@ -46,6 +47,12 @@ class Cover(NamedTuple):
     def doubles(self) -> int:
         """Hits beyond the first at a sample."""
         return self.hits - int(self.mask.sum())
+
+
+@cache
+def machine() -> Machine:
+    """Load the atlas's machine once: it draws hundreds of small pictures."""
+    return load_machine(MACHINE)
 
 
 Method = Callable[[NDArray[np.float64], int], Cover]
@@ -91,7 +98,7 @@ def by_pipeline(pipeline: str, **options: Any) -> Method:
 
 def draw(scene: Scene, pipeline: str, size: int, camera: Any = None, **options: Any) -> Run:
     """Draw a square picture on the atlas's machine."""
-    return simulate(scene, pipeline, load_machine(MACHINE), width=size, height=size, camera=camera, **options)
+    return simulate(scene, pipeline, machine(), width=size, height=size, camera=camera, **options)
 
 
 def barycentrics(points: NDArray[np.float64], size: int) -> Cover:
@@ -164,7 +171,7 @@ def _grid_cover(corners: NDArray[np.float64], size: int) -> Cover:
     count = np.full(tiles.total, len(corners), np.uint32)
     lists = np.tile(np.arange(len(corners), dtype=np.uint32), tiles.total)
     start = (np.arange(tiles.total) * len(corners)).astype(np.uint32)
-    simt = load_machine(MACHINE).simt
+    simt = machine().simt
     _, depth, overdraw, _ = tile_raster(vertices, count, start, lists, tiles, size, size, simt)
     assert overdraw is not None  # noqa: S101 - counting is on
     return Cover(depth[::-1] < 1, int(overdraw.sum()))
