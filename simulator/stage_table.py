@@ -57,7 +57,8 @@ def _row(parts: list[tuple[Any, Any, Timing]], warp: int) -> dict[str, Any]:
     simt = [(work, launch) for work, launch, _ in parts if isinstance(launch, Launch)]
     machine = sum((launch.events.sum(axis=0) for _, launch in simt), np.zeros(len(MachineEvent)))
     instructions = float(sum(machine[event] for event in INSTRUCTION_CLASSES))
-    tests, hits = (sum(work.counts().get(name, 0) for work, _, _ in parts) for name in ("SAMPLE_TESTS", "SAMPLE_HITS"))
+    counts = [work.counts() for work, _, _ in parts]
+    tests, hits = (sum(count.get(name, 0) for count in counts) for name in ("SAMPLE_TESTS", "SAMPLE_HITS"))
     return {
         "blocks": sum(launch.grid for _, launch in simt),
         "warps": sum(launch.grid * -(-launch.block // warp) for _, launch in simt),
