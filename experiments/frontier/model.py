@@ -6,10 +6,11 @@ Set TILESTAMP_FRONTIER=long for more frames, rates and seeds (minutes).
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from experiments.frontier.model_frames import Timed, frames, is_long, warnings
-from experiments.frontier.model_notes import AUTO, BOUNDS, FULL, notes
+from experiments.frontier.model_notes import AUTO, BOUNDS, COUNTS, FULL, notes
 from experiments.frontier.pareto import pareto_front
 from experiments.published import published
 from experiments.registry import Progress
@@ -29,7 +30,7 @@ SOURCE = (
     "Clock: this computer. Times of frames: Eisenacher & Loop 2010, Laine & Karras 2011, an H200. Other simulators: as "
     "published (detailed_simulators.csv names each source)"
 )
-FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "auto": AUTO}
+FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "auto": AUTO, "counts": COUNTS}
 RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
 SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
 EXECUTED = "ours, all units executed"
@@ -113,14 +114,15 @@ def _priced(frame: Timed, drawn: Run, fidelity: Fidelity, method: str, seconds: 
 
 def _rows(frame: Timed, answers: list[Answer]) -> list[dict[str, Any]]:
     """Each answer beside the full one and what is known."""
-    full = answers[0].milliseconds
+    full = answers[0]
     return [
         {
             "frame": frame.name,
             **asdict(answer),
             "known_ms": frame.known_ms,
             "known": frame.kind,
-            "error_against_full": abs(answer.milliseconds / full - 1.0),
+            "error_against_full": abs(answer.milliseconds / full.milliseconds - 1.0),
+            "error_of_instructions": abs(answer.instructions / full.instructions - 1.0),
             "error_against_known": abs(answer.milliseconds / frame.known_ms - 1.0),
         }
         for answer in answers
@@ -152,6 +154,7 @@ def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
         Cell(row["method"], column, unit, None, scale * row[name], "reported")
         for row in ours.to_dict("records")
         for column, (name, unit, scale) in shown.items()
+        if not isnan(row[name])
     ]
     for row in theirs[theirs.seconds.notna()].to_dict("records"):
         speed = str(row["speed_mark"]).partition(":")[0]
@@ -164,7 +167,7 @@ def _points(ours: "pd.DataFrame", column: str) -> "pd.DataFrame":
 
     group = ["ours, sampled" if "sampled" in name else EXECUTED for name in ours.method]
     points = {"name": ours.method, "group": group, "cost": ours.cpu_seconds, "error": 100 * ours[column]}
-    return pd.DataFrame({**points, "published": False})
+    return pd.DataFrame({**points, "published": False}).dropna(subset="error")  # counts have no time
 
 
 def _draw_full(ours: "pd.DataFrame", frames_: int, path: "Path") -> None:
