@@ -23,8 +23,9 @@ _CLASSES = {  # machine event: opcodes, told from ncu's counters by execution pi
     "sfu": "MUFU F2I I2F POPC FLO",
     "control": "BRA EXIT BSSY BSYNC BREAK CALL RET WARPSYNC R2UR S2UR S2R LDC CS2R",
     "shared": "LDS STS",
-    "load": "LDG",
-    "store": "STG",
+    "shared_atomic": "ATOMS",
+    "load": "LDG LDL",
+    "store": "STG STL",
     "atomic": "ATOMG RED",
     "barrier": "BAR",
 }
@@ -108,7 +109,7 @@ def classes(block: Block) -> Counter[str]:
     return Counter(instruction.kind for instruction in block)
 
 
-def cycles(block: Block) -> float:
+def cycles(block: Block, latency: dict[str, float] = LATENCY) -> float:
     """Cycles of one warp, alone, from the first instruction of a block to the one after it; loads and barriers free."""
     now = 0.0
     ready = [0.0] * 8
@@ -116,7 +117,7 @@ def cycles(block: Block) -> float:
         waited = [ready[bit] for bit in range(6) if instruction.waits >> bit & 1]
         now = max([now, *waited])
         if instruction.sets < 7:
-            ready[instruction.sets] = now + LATENCY.get(instruction.opcode, 0.0)
+            ready[instruction.sets] = now + latency.get(instruction.opcode, 0.0)
         now += max(1, instruction.stall)
         if instruction.opcode == "BRA":
             now += BRANCH

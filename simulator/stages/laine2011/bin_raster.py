@@ -113,7 +113,7 @@ def bin_raster(
     for_parts(_play_part, parts_of(batches), given, batch, cursors, entries, None)
     queues = BinQueues(starts, entries, counts, _stream_totals(counts), bins_x, bins_y)
     segments = int((-(-counts // BIN_SEGMENT)).sum())
-    work = _work(events, setup, len(entries), segments, segment_bytes)
+    work = _work(events, setup, len(entries), segments, segment_bytes, counts.shape[1])
     overflow = capacity is not None and segments > capacity
     facts: dict[str, Any] = {
         "num_bin_segments": segments,
@@ -156,7 +156,9 @@ def _stream_totals(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     return totals
 
 
-def _work(events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: int, segment_bytes: int) -> Work:
+def _work(
+    events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: int, segment_bytes: int, bins: int
+) -> Work:
     """Put the blocks' own rows in front, and name the buffers."""
     rest = np.zeros((STREAMS, len(BinRasterEvent)), np.int64)
     if events is None:
@@ -166,6 +168,10 @@ def _work(events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: in
         rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
         rest[:, [E.LOAD, E.LOAD_TRANSACTIONS]] = WARPS  # each warp reads the number of triangles
         rest[:, E.LOAD_BYTES] = WARPS * segment_bytes
+        rest[:, E.CTA_BIN_WARPS] = -(-bins // 32)
+        table_lines = 2 * -(-bins * STREAMS * ENTRY_BYTES // max(segment_bytes, STREAMS * ENTRY_BYTES))
+        rest[:, E.STORE_TRANSACTIONS] = table_lines  # its first segment and its total in every bin
+        rest[:, E.STORE_BYTES] = table_lines * segment_bytes
     table = np.vstack([rest, events])
     visible = int(np.sum(setup.subtriangles, dtype=np.int64))
     reads = int(table[:, BinRasterEvent.LOAD_BYTES].sum())

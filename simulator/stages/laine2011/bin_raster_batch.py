@@ -52,14 +52,16 @@ class BinScratch(NamedTuple):
     ring: NDArray[np.int64]  # (RING,) queue entries
     before: NDArray[np.int64]  # (bins,) entries before the round
     stamp: NDArray[np.int64]  # (steps, bins) last warp and memory segment that wrote to the bin at that step
-    warps: NDArray[np.int64]  # (1,) warps so far
+    warps: NDArray[np.int64]  # (2,) warps and segments so far
+    segment: NDArray[np.int64]  # (bins,) last segment of each bin, by the order of allocation in the batch
 
 
 @njit(cache=True, nogil=True)
 def _new_scratch(bins, counting):
     steps = bins if counting else 0
     stamp = np.zeros((steps, bins), np.int64)
-    return BinScratch(np.empty(RING, np.int64), np.zeros(bins, np.int64), stamp, np.zeros(1, np.int64))
+    i64 = np.int64
+    return BinScratch(np.empty(RING, i64), np.zeros(bins, i64), stamp, np.zeros(2, i64), np.zeros(bins, i64))
 
 
 @njit(cache=True, nogil=True)
@@ -76,6 +78,16 @@ def _count_atomic(events, executed):
     events[BinRasterEvent.ATOMIC_LANES] += executed
     events[BinRasterEvent.ATOMIC_REQUESTS] += executed
     events[BinRasterEvent.ATOMIC_DEPTH] += executed
+
+
+@njit(cache=True, nogil=True)
+def _count_visible(subtriangles, events):
+    """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
+    most = 0
+    for n in subtriangles:
+        most = max(most, int(n))
+    events[BinRasterEvent.VISIBLE_WARPS] += most > 0
+    events[BinRasterEvent.MULTI_WARPS] += most > 1
 
 
 @njit(cache=True, nogil=True)
@@ -109,6 +121,7 @@ def _read_step(given, ring, read, write, first, end, events):
         for start in range(first, last, WARP):  # a byte a lane
             segments = (min(start + WARP, last) - 1) // given.segment_bytes - start // given.segment_bytes + 1
             _count_load(events, 1, segments, segments * given.segment_bytes)
+            _count_visible(given.subtriangles[start : min(start + WARP, last)], events)
     return go_on, write
 
 
@@ -196,7 +209,9 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
         events[BinRasterEvent.SLOW_LANES] += lanes
         events[BinRasterEvent.SLOW_STEPS] += largest
         events[BinRasterEvent.SLOW_LANE_STEPS] += area
-        ors, replays = _walk_votes(boxes, lanes, largest, given.bins_x)
+        ors, replays, ends = _walk_votes(boxes, lanes, largest, given.bins_x)
+        events[BinRasterEvent.ROW_ENDS] += ends
+    events[BinRasterEvent.WALK_STEPS] += largest
     events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
     events[BinRasterEvent.SHARED_ATOMIC] += ors
     events[BinRasterEvent.BANK_REPLAYS] += replays
@@ -204,20 +219,78 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
 
 
 @njit(cache=True, nogil=True)
-def _count_segments(counts, before, events):
-    """Count new segments of a round: a bin needs one where its entries pass a multiple of 512."""
-    fresh, warps = 0, 0
+def _count_bins(bins, events):
+    """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
+    warps = (bins + WARP - 1) // WARP
+    events[BinRasterEvent.BIN_WARPS] += warps
+    events[BinRasterEvent.BIN_LANES] += bins
+    events[BinRasterEvent.MASK_CLEARS] += BLOCK // WARP * warps
+    events[BinRasterEvent.MASK_WARPS] += BLOCK // WARP
+    events[BinRasterEvent.MASK_LANES] += BLOCK // WARP * min(bins, WARP)
+
+
+@njit(cache=True, nogil=True)
+def _count_longest(walk, steps, paths, events):
+    """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
+    events[BinRasterEvent.LONGEST_WALKS] += walk
+    events[BinRasterEvent.LONGEST_SLOW] += steps
+    events[BinRasterEvent.SINGLE_ROUNDS] += paths & 1
+    events[BinRasterEvent.FAST_ROUNDS] += (paths >> FAST) & 1
+    events[BinRasterEvent.SLOW_ROUNDS] += (paths >> SLOW) & 1
+
+
+@njit(cache=True, nogil=True)
+def _count_segments(given, counts, scratch, events):
+    """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
+
+    Its link is written where the last one ends; the new one's own link and count stand beside those of its neighbours.
+    """
+    before = scratch.before
+    fresh, warps, stores = 0, 0, 0
     for first in range(0, counts.size, WARP):
         mine = 0
         for b in range(first, min(first + WARP, counts.size)):
-            mine += _segments(counts[b]) - _segments(before[b])
+            if _segments(counts[b]) > _segments(before[b]):
+                scratch.segment[b] = scratch.warps[1] + fresh + mine
+                mine += 1
             before[b] = counts[b]
+        if mine > 0:
+            stores += mine + 2 * _sectors(scratch.warps[1] + fresh, mine, given.segment_bytes)
         fresh, warps = fresh + mine, warps + (mine > 0)
+    scratch.warps[1] += fresh
+    _count_store(events, stores, given.segment_bytes)
     events[BinRasterEvent.SEGMENTS] += fresh
     events[BinRasterEvent.ALLOC_WARPS] += warps
     events[BinRasterEvent.SHARED_ATOMIC] += warps
     events[BinRasterEvent.ALLOC_ROUNDS] += fresh > 0
     _count_atomic(events, fresh > 0)
+
+
+@njit(cache=True, nogil=True)
+def _count_closing(given, counts, scratch, events):
+    """Count the open segments at the end of a batch, and the writes of their counts."""
+    for first in range(0, counts.size, WARP):
+        closing, last = 0, -1
+        stores = 0
+        for b in range(first, min(first + WARP, counts.size)):
+            if counts[b] % BIN_SEGMENT:
+                closing += 1
+                here = scratch.segment[b] * ENTRY_BYTES // given.segment_bytes
+                stores, last = stores + (here != last), here
+        events[BinRasterEvent.CLOSING_WARPS] += closing > 0
+        _count_store(events, stores, given.segment_bytes)
+
+
+@njit(cache=True, nogil=True)
+def _count_store(events, segments, size):
+    events[BinRasterEvent.STORE_TRANSACTIONS] += segments
+    events[BinRasterEvent.STORE_BYTES] += segments * size
+
+
+@njit(cache=True, nogil=True)
+def _sectors(first, words, size):
+    """Memory segments of ``words`` words from word ``first`` on."""
+    return ((first + words) * ENTRY_BYTES - 1) // size - first * ENTRY_BYTES // size + 1
 
 
 @njit(cache=True, nogil=True)
@@ -238,22 +311,28 @@ def _play_batch(given, b, batch, counts, entries, events):
         while write - read < BLOCK and first < end:
             first, write = _read_step(given, scratch.ring, read, write, first, end, events)
         m = min(BLOCK, write - read)
+        longest, steps, paths = 0, 0, 0
         for start in range(read, read + m, WARP):
             lanes = min(WARP, read + m - start)
             path, largest = _load_warp(given, scratch.ring, start, lanes, boxes)
             if events is not None:
                 scratch.warps[0] += 1
+                longest, paths = max(longest, largest), paths | (1 << path)
+                steps = max(steps, largest if path == SLOW else 0)
                 _count_warp(given, path, largest, boxes, lanes, scratch, start, events)
             _emit_warp(given, path, boxes, lanes, scratch, start, counts, entries, events)
         if events is not None:
             events[BinRasterEvent.ROUNDS] += 1
             events[BinRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
             events[BinRasterEvent.TRIANGLES] += m
-            _count_segments(counts, scratch.before, events)
+            _count_bins(counts.size, events)
+            _count_longest(longest, steps, paths, events)
+            _count_segments(given, counts, scratch, events)
         read += m
         if read == write and first >= end:
             break
     if events is not None:
         events[BinRasterEvent.BATCHES] += 1
         events[BinRasterEvent.CLOSED_SEGMENTS] += np.count_nonzero(counts)
+        _count_closing(given, counts, scratch, events)
         _count_atomic(events, 1)

@@ -120,22 +120,25 @@ def _small_votes(boxes, lanes, stride):
 
 @njit(cache=True, nogil=True)
 def _walk_votes(boxes, lanes, steps, stride):
-    """Shared ORs of a warp whose lanes walk their own boxes with the edge test, and their replays."""
-    ors, replays = 0, 0
+    """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
+    ors, replays, ends = 0, 0, 0
     for step in range(steps):
         boxes.bank[:] = 0
         deepest = 0
+        end = False
         for lane in range(lanes):
             box = boxes.box[lane]
             if step < box[2] * box[3]:
                 column, row = step % box[2], step // box[2]
+                end |= column == box[2] - 1
                 if _touches(boxes, lane, column, row):
                     bank = (box[0] + column + (box[1] + row) * stride) & (WARP - 1)
                     boxes.bank[bank] += 1
                     deepest = max(deepest, boxes.bank[bank])
         if deepest > 0:
             ors, replays = ors + 1, replays + deepest - 1
-    return ors, replays
+        ends += end
+    return ors, replays, ends
 
 
 @njit(cache=True, nogil=True)

@@ -121,7 +121,8 @@ def coarse_raster(
     used = in_frame[order] & (deferred_clear | (counts[order] > 0))
     active = bin_tiles[order][used].astype(np.int32)
     segments = int((-(-counts // TILE_SEGMENT)).sum())
-    work = _work(events, used.sum(axis=1), simt, given, segments)
+    empty = used & (counts[order] == 0)
+    work = _work(events, used, empty, simt, given, segments)
     facts: dict[str, Any] = {
         "num_tile_segments": segments,
         "bytes": segments * SEGMENT_BYTES,
@@ -169,7 +170,12 @@ def _bin_tiles(given: CoarseInput, bins: int) -> NDArray[np.int64]:
 
 
 def _work(
-    events: NDArray[np.int64] | None, active: NDArray[np.int64], simt: Simt, given: CoarseInput, segments: int
+    events: NDArray[np.int64] | None,
+    active: NDArray[np.bool_],
+    empty: NDArray[np.bool_],
+    simt: Simt,
+    given: CoarseInput,
+    segments: int,
 ) -> Work:
     """Put the blocks' own rows in front, and name the buffers."""
     E = CoarseRasterEvent
@@ -179,7 +185,8 @@ def _work(
     else:
         rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
         rest[:, [E.LOAD, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]] = _sort_loads(len(given.starts) - 1, given.segment_bytes)
-        events[:, E.ACTIVE_TILES] = active
+        _count_ends(events, active, empty, given.segment_bytes)
+        _count_sort(rest, len(given.starts) - 1)
     table = np.vstack([rest, events])
     entries = len(given.entries) * ENTRY_BYTES
     streams = (
@@ -190,6 +197,33 @@ def _work(
         Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
     )
     return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
+
+
+def _count_sort(rest: NDArray[np.int64], bins: int) -> None:
+    """Count what each block does to sort the bins: runs of 16, then merges of runs twice as long each time."""
+    E = CoarseRasterEvent
+    warps = -(-bins // WARP)
+    merges = max(-(-bins // 16) - 1, 0).bit_length()
+    rest[:, E.BIN_WARPS] = warps
+    rest[:, E.SORT_WARPS] = -(-max(bins // 2, 1) // WARP)
+    rest[:, E.SORT_MERGES] = merges
+    rest[:, E.SORT_STEPS] = warps * sum(4 + i for i in range(merges))
+
+
+def _count_ends(
+    events: NDArray[np.int64], active: NDArray[np.bool_], empty: NDArray[np.bool_], segment_bytes: int
+) -> None:
+    """Count what ends a bin: the numbers of its active tiles, and the mark of those that are empty."""
+    E = CoarseRasterEvent
+    words = segment_bytes // ENTRY_BYTES
+    of_warp = active.reshape(len(active), TILES // WARP, WARP).sum(axis=2)
+    row = min(words, BIN_TILES)
+    marks = empty.reshape(len(empty), TILES // row, row).any(axis=2).sum(axis=1)
+    events[:, E.ACTIVE_TILES] = active.sum(axis=1)
+    events[:, E.ACTIVE_WARPS] = (of_warp > 0).sum(axis=1)
+    stores = (-(-of_warp // words)).sum(axis=1) + marks
+    events[:, E.STORE_TRANSACTIONS] += stores
+    events[:, E.STORE_BYTES] += stores * segment_bytes
 
 
 def _sort_loads(bins: int, segment_bytes: int) -> tuple[int, int, int]:

@@ -78,7 +78,7 @@ def _place(given, b):
 
 @njit(cache=True, nogil=True)
 def _load_warp(given, place, first, lanes, boxes):
-    """Boxes of a warp's triangles; returns its case, the tiles of the largest box and those of the union box."""
+    """Boxes of a warp's triangles; returns its case, tiles of the largest and of the union box, and its rows."""
     small = True
     largest = 1
     low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
@@ -92,12 +92,12 @@ def _load_warp(given, place, first, lanes, boxes):
         largest = max(largest, columns * rows)
         low_x, low_y = min(low_x, x), min(low_y, y)
         high_x, high_y = max(high_x, x + columns), max(high_y, y + rows)
-    union = (high_x - low_x) * (high_y - low_y)
+    union, rows = (high_x - low_x) * (high_y - low_y), high_y - low_y
     if small:
-        return CASE_A, largest, union
+        return CASE_A, largest, union, rows
     for lane in range(lanes):
         _lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
-    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union
+    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, rows
 
 
 @njit(cache=True, nogil=True)
@@ -115,7 +115,7 @@ def _emit_warp(case, boxes, lanes, counts, queues):
 
 
 @njit(cache=True, nogil=True)
-def _count_warp(given, case, largest, union, boxes, lanes, first, events):
+def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
     """Count what a warp's loads and its case cost."""
     area, indirect = 0, False
     for lane in range(lanes):
@@ -130,11 +130,14 @@ def _count_warp(given, case, largest, union, boxes, lanes, first, events):
     elif case == CASE_B:
         events[CoarseRasterEvent.CASE_B_WARPS] += 1
         events[CoarseRasterEvent.CASE_B_STEPS] += union
+        events[CoarseRasterEvent.CASE_B_ROWS] += rows
+        events[CoarseRasterEvent.CASE_B_LANE_STEPS] += area
+        events[CoarseRasterEvent.CASE_B_LANE_ROWS] += rows * lanes
     else:
         events[CoarseRasterEvent.CASE_C_WARPS] += 1
         events[CoarseRasterEvent.CASE_C_STEPS] += largest
         events[CoarseRasterEvent.CASE_C_LANE_STEPS] += area
-        ors, replays = _walk_votes(boxes, lanes, largest, BIN_TILES)
+        ors, replays, _ = _walk_votes(boxes, lanes, largest, BIN_TILES)
     events[CoarseRasterEvent.SHARED_ATOMIC] += ors
     events[CoarseRasterEvent.BANK_REPLAYS] += replays
     _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
@@ -157,14 +160,26 @@ def _count_atomic(events, executed):
 
 
 @njit(cache=True, nogil=True)
-def _count_emits(given, counts, before, events):
+def _count_emits(given, counts, before, tails, events):
     """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
     fresh, touched, emits, stores = 0, 0, 0, 0
+    linked, opened, most = 0, 0, 0  # of the tiles of a warp
     for tile in range(counts.size):
         place, end = before[tile], counts[tile]
+        new = (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
+        linked, opened, most = linked + (new > 0), opened + (new > 0 and place == 0), max(most, end - place)
+        if tile % WARP == WARP - 1:
+            events[CoarseRasterEvent.LINK_WARPS] += linked > 0
+            events[CoarseRasterEvent.FIRST_WARPS] += opened > 0
+            events[CoarseRasterEvent.SCAN_WARPS] += most > 1
+            stores += linked - opened + (opened * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes
+            linked, opened, most = 0, 0, 0
         before[tile] = end
         touched += end > place
-        fresh += (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
+        fresh += new
+        if new > 0:
+            tails[TILES] += new
+            tails[tile] = tails[TILES]
         while place < end:  # the part of a tile's emits that one warp writes
             part = min(end - place, WARP - emits % WARP)
             first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
@@ -174,11 +189,33 @@ def _count_emits(given, counts, before, events):
     events[CoarseRasterEvent.EMITS] += emits
     events[CoarseRasterEvent.EMIT_STEPS] += (emits + BLOCK - 1) // BLOCK
     events[CoarseRasterEvent.EMIT_WARPS] += (emits + WARP - 1) // WARP
+    events[CoarseRasterEvent.EMIT_BLOCK_WARPS] += min((emits + WARP - 1) // WARP, BLOCK // WARP)
+    events[CoarseRasterEvent.SEGMENT_WARPS] += (fresh + WARP - 1) // WARP
+    stores += 2 * ((fresh * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes)  # links and counts
     events[CoarseRasterEvent.SEGMENTS] += fresh
     events[CoarseRasterEvent.ALLOC_ROUNDS] += fresh > 0
     events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
     events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
     _count_atomic(events, fresh > 0)
+
+
+@njit(cache=True, nogil=True)
+def _count_tails(given, counts, tails, events):
+    """Count the writes that end the tiles' lists: the last segment's link, and its count where it is not full.
+
+    ``tails`` numbers the last segment of each tile in the order of allocation.
+    """
+    links, sizes = -1, -1
+    for tile in range(TILES):
+        if tile % WARP == 0:
+            links, sizes = -1, -1
+        here, stores = tails[tile] * ENTRY_BYTES // given.segment_bytes, 0
+        if counts[tile] > 0:
+            stores, links = int(here != links), here
+        if counts[tile] % TILE_SEGMENT:
+            stores, sizes = stores + (here != sizes), here
+        events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
+        events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
 @njit(cache=True, nogil=True)
@@ -193,6 +230,7 @@ def _count_merge(given, b, events):
                 batch, taken = batch + 1, 0
             if batch == given.batch_counts.shape[0]:
                 break
+            events[CoarseRasterEvent.STREAM_READS] += 1
             size = min(given.batch_counts[batch, b] - taken, BIN_SEGMENT)
             taken, write = taken + size, write + size
             warps = (size + WARP - 1) // WARP
@@ -211,7 +249,7 @@ def _play_bin(given, b, counts, queues, events):
     filling.
     """
     boxes, place = _new_boxes(), _place(given, b)
-    before = np.zeros(TILES, np.int64)
+    before, tails = np.zeros(TILES, np.int64), np.zeros(TILES + 1, np.int64)
     start, end = given.starts[b], given.starts[b + 1]
     if events is not None:
         _count_merge(given, b, events)
@@ -220,13 +258,23 @@ def _play_bin(given, b, counts, queues, events):
         _count_atomic(events, 2)  # its draw, and room among the active tiles
     for read in range(start, end, BLOCK):
         m = min(BLOCK, end - read)
+        longest_b, longest_c, cases = 0, 0, 0
         for first in range(read, read + m, WARP):
             lanes = min(WARP, read + m - first)
-            case, largest, union = _load_warp(given, place, first, lanes, boxes)
+            case, largest, union, rows = _load_warp(given, place, first, lanes, boxes)
             if events is not None:
-                _count_warp(given, case, largest, union, boxes, lanes, first, events)
+                longest_b = max(longest_b, union if case == CASE_B else 0)
+                longest_c = max(longest_c, largest if case == CASE_C else 0)
+                cases |= 1 if case == CASE_A else 2
+                _count_warp(given, case, largest, union, rows, boxes, lanes, first, events)
             _emit_warp(case, boxes, lanes, counts, queues)
         if events is not None:
             events[CoarseRasterEvent.ROUNDS] += 1
+            events[CoarseRasterEvent.LONGEST_B] += longest_b
+            events[CoarseRasterEvent.LONGEST_C] += longest_c
+            events[CoarseRasterEvent.CASE_A_ROUNDS] += cases & 1
+            events[CoarseRasterEvent.WIDE_ROUNDS] += cases >> 1
             events[CoarseRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
-            _count_emits(given, counts, before, events)
+            _count_emits(given, counts, before, tails, events)
+    if events is not None:
+        _count_tails(given, counts, tails, events)

@@ -46,6 +46,8 @@ MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colou
     "color": (False, False, True, False),
 }
 WARP_LINES = int(Coalescing.WARP_LINES)
+START_LOADS = 3  # of a warp that starts: whether a buffer was too small
+DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
 
 
@@ -194,6 +196,7 @@ def fine_raster(
     clear_color: int = 0,
     clear_depth: float = 1.0,
     counting: bool = True,
+    starts: bool = True,
 ) -> tuple[FrameBuffers, Work]:
     """Draw the queued triangles of all active tiles.
 
@@ -223,6 +226,8 @@ def fine_raster(
     clear_depth : float
         0 to 1; release nvdiffrast always clears to 1.
     counting : bool
+    starts : bool
+        Count what the warps do besides tiles, too; not where only part of the tiles is drawn.
 
     Returns
     -------
@@ -263,23 +268,29 @@ def fine_raster(
             active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers,
             True if samples > 1 else None, table if counting else None,
         )  # fmt: skip
-    if counting:
-        _count_starts(table, WARPS * simt.sms)
+    if counting and starts:
+        count_starts(table, WARPS * simt.sms, 128 if draw.coalescing == WARP_LINES else 32)
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
     streams = fine_streams(table, setup, len(tile_entries), width, height, samples)
+    queue = None
+    if counting and release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
+        queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
     work = Work(
-        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams
+        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams, queue
     )
     return buffers, work
 
 
-def _count_starts(table: NDArray[np.int64], warps: int) -> None:
+def count_starts(table: NDArray[np.int64], warps: int, segment_bytes: int) -> None:
     """Add what a warp does besides its tiles to the first that it draws: it starts, and its last draw finds no tile."""
     E = FineRasterEvent
     if len(table):
         rows = np.bincount(np.arange(warps) % len(table), minlength=len(table))
         for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
             table[:, event] += rows
+        loads = START_LOADS * rows + table[:, E.ATOMIC]  # and with each draw the number of tiles
+        table[:, E.LOAD_TRANSACTIONS] += loads
+        table[:, E.LOAD_BYTES] += loads * segment_bytes
 
 
 def fine_streams(

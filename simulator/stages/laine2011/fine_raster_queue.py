@@ -54,6 +54,14 @@ class FineRasterEvent(IntEnum):
     LOAD_BYTES = 28
     STORE_TRANSACTIONS = 29
     STORE_BYTES = 30
+    WARP_STARTS = 31  # warps that start, at their first tile: coverage table, and the last draw, which finds no tile
+    REFILLS = 32  # times that a warp reads on for more fragments
+    FULL_SEGMENTS = 33  # reads that queue a triangle
+    FULL_LANES = 34  # triangles queued
+    PARTIAL_SEGMENTS = 35  # reads of fewer than 32 entries: the other lanes take a slow reciprocal along
+    LIST_WARPS = 36  # SEGMENTS, for what only the lanes with an entry do
+    TAG_WARPS = 37  # FRAGMENT_ROUNDS, for what only the lanes with a queued triangle do
+    TAG_LANES = 38  # queued triangles, up to 32, summed over fragment rounds
 
 
 class Draw(NamedTuple):
@@ -138,6 +146,7 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
     first, last = state[NEXT], min(state[NEXT] + SEGMENT, state[END])
     state[NEXT] = last
     killed = empty = 0
+    queued = state[TAIL]
     for k in range(first, last):
         slot = np.int64(entries[k])
         if row is not None:
@@ -165,8 +174,13 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
         row[4] += n - killed
         row[5] += empty
         row[17] += PIXELS * (n - killed)
-        row[27] += 1 if draw.coalescing != 3 else 4  # the entries, 128 bytes in a line of their own
-        row[28] += 4 * SEGMENT
+        row[33] += state[TAIL] > queued
+        row[34] += state[TAIL] - queued
+        row[35] += n < SEGMENT
+        row[36] += 1
+        lists = 1 if draw.coalescing != 3 else (n + 7) // 8  # the entries, up to 128 bytes in a line of their own
+        row[27] += lists
+        row[28] += lists * (32 if draw.coalescing == 3 else 4 * SEGMENT)
         row[27] += 2  # the segment's count and the next segment
         row[28] += 2 * (HEADER_BYTES * 2 if draw.coalescing != 2 else 128)
         count_gather(tile, n, HEADER_BYTES, draw, row)
@@ -181,6 +195,8 @@ def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom
         tile.slots[i] = tile.slots[state[HEAD] + i]
         tile.masks[i] = tile.masks[state[HEAD] + i]
     state[HEAD], state[TAIL] = 0, queued
+    if row is not None:
+        row[32] += 1
     while state[FRAGMENTS] < WARP and state[NEXT] < state[END]:
         read_segment(setup, entries, draw, tile, left, bottom, row)
 

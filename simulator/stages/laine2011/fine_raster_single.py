@@ -8,8 +8,10 @@ from numba import njit
 from simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
+    HEAD,
     NEXT,
     PIXELS,
+    TAIL,
     UPDATE,
     ZMAX,
     Draw,
@@ -137,10 +139,13 @@ def draw_tile_single(
             refill(setup, entries, draw, tile, left, bottom, row)
         if state[FRAGMENTS] == 0:
             return
+        queued = min(state[TAIL] - state[HEAD], 32)
         n = take(tile)
         if row is not None and draw.depth:
             count_reads(setup, draw, tile, n, np.int64(0b0001), row)
         kept = _depth_test(setup, draw, tile, n, column, line) if draw.depth else n
         writes, longest = _rop(setup, colors, draw, tile, kept, column, line)
         if row is not None:
+            row[37] += 1
+            row[38] += queued
             _count_round(setup, draw, tile, n, kept, writes, longest, row)

@@ -79,7 +79,7 @@ def _holds_site(a: Corner, b: Corner, c: Corner, x: int, y: int, sign: int) -> A
 
 @njit(cache=True, nogil=True)
 def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> Any:
-    """Whether the triangle surely holds no site of the sample grid."""
+    """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
     q = SUBPIXELS >> view.log_samples
     bx, by = view.half_width - q // 2, view.half_height - q // 2
     lox = wrap_int32(min(a.sx, b.sx, c.sx) + q - 1 + bx) & -q
@@ -87,22 +87,23 @@ def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> 
     loy = wrap_int32(min(a.sy, b.sy, c.sy) + q - 1 + by) & -q
     hiy = wrap_int32(max(a.sy, b.sy, c.sy) + by) & -q
     if lox > hix or loy > hiy:
-        return True
+        return True, 0
     spread = (hix - lox) + (hiy - loy)
-    if spread > q or _holds_site(a, b, c, lox - bx, loy - by, sign):
-        return False
-    return spread == 0 or not _holds_site(a, b, c, hix - bx, hiy - by, sign)
+    if spread > q:
+        return False, 0
+    if spread == 0 or _holds_site(a, b, c, lox - bx, loy - by, sign):
+        return not _holds_site(a, b, c, lox - bx, loy - by, sign), 1
+    return not _holds_site(a, b, c, hix - bx, hiy - by, sign), 2
 
 
 @njit(cache=True, nogil=True)
 def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
-    """Outcome of the culls that follow snapping, and the signed area."""
+    """Outcome of the culls that follow snapping, the signed area, and the sample sites that were looked at."""
     area = snapped_area(a, b, c)
     if area == 0 or (area < 0 and view.cull_backfaces):
-        return 1, area
-    if _between_samples(a, b, c, view, 1 if area > 0 else -1):
-        return 2, area
-    return 0, area
+        return 1, area, 0
+    between, sites = _between_samples(a, b, c, view, 1 if area > 0 else -1)
+    return 2 if between else 0, area, sites
 
 
 @njit(cache=True, nogil=True)

@@ -22,6 +22,7 @@ from simulator.stages.laine2011.triangle_setup_count import (
     POSITION_BYTES,
     TriangleSetupEvent,
     count_lane,
+    count_paths,
     count_warp,
     new_counting,
 )
@@ -68,14 +69,14 @@ def _setup_range(
         last = min(warp + WARP, end)
         allocating = np.int64(0)  # a literal that changes in a loop has its callees compiled twice
         if table is not None:
-            for i in range(counting.longest.size):
-                counting.longest[i] = 0
+            counting.longest[:] = 0
+            counting.paths[:] = 0
         for t in range(warp, last):
             out.first[t] = t
-            kept, fan, outcome = 0, 0, OUTSIDE
+            kept, fan, outcome, sites = 0, 0, OUTSIDE, 0
             in_range = load_corners(positions, triangles, t, clip)
             if in_range:
-                outcome = fast_path(clip, view, out, t, triangles)
+                outcome, sites = fast_path(clip, view, out, t, triangles)
                 kept = 1 if outcome == 0 else 0
             if outcome == CLIPPED:
                 kept, fan = clip_and_store(scratch, view, out, -1, t, triangles)
@@ -84,6 +85,7 @@ def _setup_range(
             if table is not None:
                 counting.read[t - warp] = in_range
                 count_lane(table[warp // BLOCK], counting, outcome, kept, fan, scratch.steps)
+                count_paths(counting.paths, clip, in_range, outcome, sites, scratch.steps)
         if table is not None:
             row = table[warp // BLOCK]
             count_warp(row, allocating, counting, triangles, warp, last - warp, view, out, simt)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from models.coalescing import transactions
 from models.simt import Simt
 from simulator.stages.laine2011.subtriangle import View
-from simulator.stages.laine2011.triangle_setup_paths import OUTSIDE, WARP, Setup
+from simulator.stages.laine2011.triangle_setup_paths import CLIPPED, OUTSIDE, WARP, Setup
 
 INDEX_BYTES, POSITION_BYTES, HEADER_BYTES = 12, 16, 16
 RECORD_PARTS = 4  # of 16 bytes, in release 1.1
@@ -43,6 +43,14 @@ class TriangleSetupEvent(IntEnum):
     LOAD_BYTES = 21
     STORE_TRANSACTIONS = 22
     STORE_BYTES = 23
+    OUTSIDE_WARPS = 24  # warps with a first vertex outside the frustum: all six planes are tested
+    CULLED_WARPS = 25  # warps with a triangle outside one view plane
+    SITE_WARPS = 26  # warps with an unclipped triangle whose box holds one or two sample sites: the first is tested
+    SITE_LANES = 27
+    RETEST_WARPS = 28  # warps of those with a triangle that has missed the first of two sites
+    CLIP_AXES = 29  # axes along which a warp clips
+    FAST_WARPS = 30  # warps with a triangle that needs no clipping: it is snapped and culled
+    FAST_LANES = 31
 
 
 _E = TriangleSetupEvent
@@ -50,6 +58,8 @@ _ACCESSES = 12  # three indices and three positions, loaded; count, header and f
 _LOADS = 6
 _STEP_COLUMNS = np.array([_E.SNAP_WARPS, _E.STORE_STEPS, _E.CLIP_WARPS, *[_E.CLIP_STEPS] * 6, _E.FAN_STEPS])
 """Columns of what the longest lane of a warp decides; the column that follows counts lanes."""
+
+_PATH_WARPS = np.array([_E.OUTSIDE_WARPS, _E.CULLED_WARPS, _E.SITE_WARPS])
 
 
 class Counting(NamedTuple):
@@ -59,6 +69,7 @@ class Counting(NamedTuple):
     longest: NDArray[np.int64]  # (10,) maxima over the warp
     lanes: NDArray[np.int64]  # (32,) addresses
     read: NDArray[np.bool_]  # (32,) triangles with indices in range
+    paths: NDArray[np.int64]  # (8,) lanes of the warp on each branch: see ``count_paths``
     regular: NDArray[np.int64]  # (12, 2) transactions and bytes of accesses that are the same for all full warps
 
 
@@ -68,7 +79,7 @@ def new_counting() -> Any:
     i64 = np.int64
     return Counting(
         np.zeros(_STEP_COLUMNS.size, i64), np.zeros(_STEP_COLUMNS.size, i64), np.empty(WARP, i64),
-        np.zeros(WARP, np.bool_), np.zeros((_ACCESSES, 2), i64),
+        np.zeros(WARP, np.bool_), np.zeros(8, i64), np.zeros((_ACCESSES, 2), i64),
     )  # fmt: skip
 
 
@@ -88,12 +99,29 @@ def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, 
         columns = _STEP_COLUMNS.size
         for p in range(6):
             value[3 + p] = steps[p]
-        row[_E.ATOMIC_LANES] += 1 if kept >= 2 else 0
+        if kept >= 2:
+            row[_E.ATOMIC_LANES] += 1
+            row[_E.STORE_TRANSACTIONS] += 2 * kept + 1  # header and record in slots of its own, and where those are
+            row[_E.STORE_BYTES] += 32 * (2 * kept + 1)
     for i in range(columns):
         column = _STEP_COLUMNS[i]
         row[column + 1] += value[i]
         row[column] += max(value[i] - longest[i], 0)
         longest[i] = max(longest[i], value[i])
+
+
+@njit(cache=True, nogil=True)
+def count_paths(paths: Any, corners: Any, in_range: bool, outcome: int, sites: int, steps: Any) -> None:
+    """Note the branches of one thread: first vertex outside, culled, one site, two, clips along x, y, z, no clip."""
+    w = corners[0, 3]
+    paths[0] += in_range and (w < abs(corners[0, 0]) or w < abs(corners[0, 1]) or w < abs(corners[0, 2]))
+    paths[1] += outcome == OUTSIDE
+    paths[2] += sites > 0
+    paths[3] += sites > 1
+    paths[7] += outcome >= 0
+    if outcome == CLIPPED:
+        for axis in range(3):
+            paths[4 + axis] += steps[2 * axis] > 0
 
 
 @njit(cache=True, nogil=True)
@@ -133,6 +161,14 @@ def count_warp(
 ) -> None:
     """Count what the warp of n triangles from t0 on does to memory."""
     row[_E.WARPS] += 1
+    paths = counting.paths
+    for i in range(3):
+        row[_PATH_WARPS[i]] += paths[i] > 0
+        row[_E.CLIP_AXES] += paths[4 + i] > 0
+    row[_E.SITE_LANES] += paths[2]
+    row[_E.RETEST_WARPS] += paths[3] > 0
+    row[_E.FAST_WARPS] += paths[7] > 0
+    row[_E.FAST_LANES] += paths[7]
     if allocating > 0:
         row[_E.ATOMIC] += 1
         row[_E.ATOMIC_REQUESTS] += allocating  # lanes at one address are not merged

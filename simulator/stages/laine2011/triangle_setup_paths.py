@@ -138,7 +138,7 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
     a = b = _fan_corner(clip, polygon, np.int64(0), view)  # a literal index would be compiled by itself
     for i in range(1, n):
         c = _fan_corner(clip, polygon, i, view)
-        outcome, area = cull(a, b, c, view)
+        outcome, area, _ = cull(a, b, c, view)
         if i >= 2 and outcome == 0:
             if slot >= 0:
                 _store(a, b, c, area, view, out, slot + kept, t, triangles)
@@ -161,21 +161,24 @@ def load_corners(positions: Any, triangles: Any, t: int, clip: Any) -> Any:
 
 @njit(cache=True, nogil=True)
 def fast_path(clip: Any, view: View, out: Setup, t: int, triangles: Any) -> Any:
-    """Outcome of a triangle that needs no clipping (CLIPPED where it does); a kept one is written to its own slot."""
+    """Outcome of a triangle that needs no clipping (CLIPPED where it does), and the sample sites looked at.
+
+    A kept triangle is written to its own slot.
+    """
     if _outside(clip):
-        return OUTSIDE
+        return OUTSIDE, 0
     if not _inside(clip, 2 if view.guard_band else 0):
-        return CLIPPED
+        return CLIPPED, 0
     zero, one = np.float32(0), np.float32(1)
     a = snap(clip[0, 0], clip[0, 1], clip[0, 2], clip[0, 3], zero, zero, view)
     b = snap(clip[1, 0], clip[1, 1], clip[1, 2], clip[1, 3], one, zero, view)
     c = snap(clip[2, 0], clip[2, 1], clip[2, 2], clip[2, 3], zero, one, view)
     if view.guard_band and not _in_guard_band(a, b, c):
-        return CLIPPED
-    outcome, area = cull(a, b, c, view)
+        return CLIPPED, 0
+    outcome, area, sites = cull(a, b, c, view)
     if outcome == 0:
         _store(a, b, c, area, view, out, t, t, triangles)
-    return outcome
+    return outcome, sites
 
 
 @njit(cache=True, nogil=True)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from models.atomics import CHUNK_BYTES
 from models.errors import TilestampError
 from models.launch import Stream
-from models.simt import Simt
+from models.simt import Coalescing, Simt
 from simulator.parallel import for_parts
 from simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from simulator.stages.liu2010.freepipe_triangle import SUBPIXEL_BITS, Pieces, _fixed_depth, _start_edges, make_pieces
@@ -32,6 +32,7 @@ from simulator.work import Work
 
 Packing = Literal["64", "32"]
 BLOCK = 256  # threads
+UNROLLED = 4  # pixels in a turn of the inner loop, as nvcc 13 compiles it for machines that load by sectors
 WORKERS = 4  # shares of the blocks, and strips of the frame, that run side by side
 EMPTY = 2**64 - 1  # a pixel that nothing was drawn to
 MAX_SIDE = 16384  # pixels: beyond, edge functions leave the range of the original's integers by far
@@ -237,7 +238,9 @@ def _make_work(
 ) -> Work:
     """Play all warps in lockstep and count."""
     blocks, pixels = -(-len(triangles) // block), width * height
-    shape = FrameShape(width, 8, 1, 0) if packing == "64" else FrameShape(width, 4, 2, -(-4 * pixels // 256) * 256)
+    unroll = UNROLLED if simt.coalescing == Coalescing.WARP_SECTORS else 1
+    second = -(-4 * pixels // 256) * 256
+    shape = FrameShape(width, 8, 1, 0, unroll) if packing == "64" else FrameShape(width, 4, 2, second, unroll)
     size = shape.words * max(shape.plane_bytes, shape.word_bytes * pixels)
     workers = 1 if early else WORKERS
     table = np.zeros((blocks, len(FreePipeEvent)), np.int64)

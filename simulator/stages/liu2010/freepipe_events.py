@@ -26,3 +26,8 @@ class FreePipeEvent(IntEnum):
     LOAD_TRANSACTIONS = 17
     LOAD_BYTES = 18
     CHAIN_STEPS = 19  # steps of the block's longest warp, for what nothing else hides
+    CHAIN_ROWS = 20  # its turns of the outer loop
+    CHAIN_HITS = 21  # its steps in which a lane hits
+    REST_STEPS = 22  # steps of WARP_STEPS before the unrolled loop
+    BOX_STEPS = 23  # set-ups in which a lane has a pixel to test
+    CLIP_HITS = 24  # steps of clipped triangles in which a lane hits

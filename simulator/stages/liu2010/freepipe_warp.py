@@ -89,49 +89,59 @@ def _start_rows(pieces, lanes):
 
 
 @njit(cache=True, nogil=True)
-def _start_row(pieces, lanes, r, width):
-    """Let the lanes that have row r begin it; returns how many those are, and the widest box among them."""
-    active, widest = 0, 0
+def _start_row(pieces, lanes, r, width, unroll):
+    """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
+
+    That is the most pixels of any beyond a multiple of ``unroll``, and the most turns of ``unroll`` pixels of any.
+    """
+    active, rest, turns = 0, 0, 0
     for lane in range(WARP):
         p = lanes.piece[lane]
         if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
             lanes.row_lane[active] = lane
             lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
             lanes.row_columns[active] = pieces.box[p, 1] - pieces.box[p, 0] + 1
-            widest = max(widest, lanes.row_columns[active])
+            rest = max(rest, lanes.row_columns[active] % unroll)
+            turns = max(turns, lanes.row_columns[active] // unroll)
             active += 1
             for k in range(3):
                 lanes.pixel[lane, k] = lanes.row[lane, k]
                 lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
             lanes.depth[lane] = lanes.row_depth[lane]
             lanes.row_depth[lane] += pieces.depth[p, 2] * np.float32(16)
-    return active, widest
+    return active, rest, turns
 
 
 @njit(cache=True, nogil=True)
-def _step(pieces, lanes, active, c, word_bytes, ids):
-    """Test the c-th pixel of the row of every lane that has one; returns those lanes, and those that hit.
+def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
+    """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
 
-    Lanes that have no such pixel leave the row, and the others close up.
+    With ``unroll`` a lane first tests what its row has beyond a multiple of that, in the first ``rest`` steps of the
+    warp. After those, lanes that have no such pixel leave the row, and the others close up.
     """
-    tests, hits = 0, 0
+    tests, hits, stay = 0, 0, 0
     for i in range(active):
         lane, first, columns = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i]
-        if c >= columns:
+        mine = columns % unroll if c < rest else columns - columns % unroll + rest
+        if c >= mine and c >= rest:
             continue
-        if tests < i:
-            lanes.row_lane[tests], lanes.row_pixel[tests], lanes.row_columns[tests] = lane, first, columns
+        if stay < i:
+            lanes.row_lane[stay], lanes.row_pixel[stay], lanes.row_columns[stay] = lane, first, columns
+        stay += 1
+        if c >= mine:
+            continue
+        lanes.row_pixel[stay - 1] += 1
         tests += 1
         f = lanes.pixel[lane]
         if f[0] | f[1] | f[2] >= 0:
-            lanes.address[hits] = (first + c) * word_bytes
+            lanes.address[hits] = first * word_bytes
             if ids:
                 lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
             hits += 1
         for k in range(3):
             f[k] -= lanes.row[lane, 4 + 2 * k]
         lanes.depth[lane] += pieces.depth[lanes.piece[lane], 1] * np.float32(16)
-    return tests, hits
+    return stay, tests, hits
 
 
 @njit(cache=True, nogil=True)
@@ -195,26 +205,32 @@ def _count_atomics(lanes, hits, shape, merge, row, chunks):
 
 @njit(cache=True, nogil=True)
 def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
-    """Scan the lanes' pieces in lockstep; returns the steps taken."""
+    """Scan the lanes' pieces in lockstep; returns the steps, the rows, and the steps that hit."""
     active, rows = _start_rows(pieces, lanes)
-    steps = 0
+    steps, hit_steps = 0, 0
     row[FreePipeEvent.SETUP_STEPS] += 1
+    row[FreePipeEvent.BOX_STEPS] += rows > 0
     row[FreePipeEvent.SETUP_LANES] += active
     for r in range(rows):
-        active, widest = _start_row(pieces, lanes, r, shape.width)
+        active, rest, turns = _start_row(pieces, lanes, r, shape.width, shape.unroll)
+        here = rest + turns * shape.unroll
         row[FreePipeEvent.ROW_STEPS] += 1
         row[FreePipeEvent.ROW_LANES] += active
-        row[FreePipeEvent.WARP_STEPS] += widest
-        steps += widest
-        for c in range(widest):
-            active, hits = _step(pieces, lanes, active, c, shape.word_bytes, frame is not None)
-            row[FreePipeEvent.SAMPLE_TESTS] += active
+        row[FreePipeEvent.WARP_STEPS] += here
+        row[FreePipeEvent.REST_STEPS] += rest
+        steps += here
+        for c in range(here):
+            active, tests, hits = _step(
+                pieces, lanes, active, c, rest, shape.unroll, shape.word_bytes, frame is not None
+            )
+            row[FreePipeEvent.SAMPLE_TESTS] += tests
+            hit_steps += hits > 0
             row[FreePipeEvent.SAMPLE_HITS] += hits
             if frame is not None and hits > 0:
                 hits = _early(lanes, hits, t0, frame, shape.word_bytes, simt, row)
             if hits > 0:
                 _count_atomics(lanes, hits, shape, simt.atomic_merge, row, chunks)
-    return steps
+    return steps, rows, hit_steps
 
 
 class FrameShape(NamedTuple):
@@ -224,11 +240,12 @@ class FrameShape(NamedTuple):
     word_bytes: int
     words: int  # atomics a fragment
     plane_bytes: int  # bytes from a fragment's one word to the next
+    unroll: int  # pixels in a turn of the inner loop
 
 
 @njit(cache=True, nogil=True)
 def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, frame):
-    """One warp, triangles t0..t0+lanes_in-1; returns the steps of its longest way."""
+    """One warp, triangles t0..t0+lanes_in-1; returns its steps, its rows, and its steps that hit."""
     row[FreePipeEvent.WARPS] += 1
     row[FreePipeEvent.LANES_IN] += lanes_in
     _count_vertices(triangles, t0, lanes_in, simt, lanes.address, row)
@@ -244,16 +261,18 @@ def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, fram
             turns = max(turns, pieces.first[t + 1] - pieces.first[t])
     row[FreePipeEvent.CLIP_WARPS] += clip > 0
     row[FreePipeEvent.CLIP_LANES] += clip
-    steps = 0
+    steps, rows, hit_steps = 0, 0, 0
     if inside > 0:
-        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+        steps, rows, hit_steps = _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
     for i in range(turns):
         for lane in range(WARP):
             t = t0 + lane
             mine = lane < lanes_in and pieces.kind[t] == CLIPPED and pieces.first[t] + i < pieces.first[t + 1]
             lanes.piece[lane] = pieces.first[t] + i if mine else -1
-        steps += _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
-    return steps
+        more = _scan(pieces, lanes, t0, shape, simt, row, chunks, frame)
+        steps, rows, hit_steps = steps + more[0], rows + more[1], hit_steps + more[2]
+        row[FreePipeEvent.CLIP_HITS] += more[2]
+    return steps, rows, hit_steps
 
 
 @njit(cache=True, nogil=True)
@@ -264,6 +283,11 @@ def _blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, f
         longest = 0
         for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
             lanes_in = min(WARP, min((b + 1) * block, triangles.shape[0]) - t0)
-            steps = _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks[part], frame)
-            longest = max(longest, steps)
-        table[b, FreePipeEvent.CHAIN_STEPS] = longest
+            steps, rows, hit_steps = _warp(
+                triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks[part], frame
+            )
+            if steps > longest:
+                longest = steps
+                table[b, FreePipeEvent.CHAIN_STEPS] = steps
+                table[b, FreePipeEvent.CHAIN_ROWS] = rows
+                table[b, FreePipeEvent.CHAIN_HITS] = hit_steps

@@ -1,0 +1,167 @@
+"""The instruction mix of CudaRaster on compute capability 9.0, written from its machine code and a few fitted numbers.
+
+    python -m experiments.silicon.cudaraster_mix LISTING > simulator/mixes/cudaraster/cc9.toml
+
+LISTING is what ``cuobjdump -sass`` prints (see ``cudaraster_blocks``). Instructions of each event by class, and by the
+compiler's schedule the cycles that a lone warp needs for them, are read from the code. ``FITTED`` holds what the blocks
+do not say: it was fitted by ``experiments.silicon.leave_one_out``, which also shows how far the fit carries.
+"""
+
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from experiments.silicon import sass
+from experiments.silicon.cudaraster_blocks import CHAINS, LANES, PASSED, REGISTERS, RUNS, Events, Run
+from experiments.silicon.sass import Block
+
+ALU_CYCLES = 4.11  # of one step of chain_alu: the machine file's latency.alu_cycles
+BARRIER_CYCLES = 24.0  # a barrier of 16 warps takes longer than the machine file's, of 4 (microbenchmarks.csv)
+LATENCY = sass.LATENCY | {  # microbenchmarks.csv, group latency
+    "POPC": 17.0,
+    "FLO": 17.0,
+    "VOTE": 17.0,  # VOTE.BALLOT
+    "MATCH": 369.0,  # MATCH.ANY
+    "ATOMS": 36.0,  # atom_shared_add
+    "LDL": 48.0,  # ld_ca_16KiB
+}
+LONG = 1000.0  # cycles: how often a path waits for a load shows when a load takes this long
+OWN_LOADS = {  # loads that the stages do not count
+    ("binRaster", "INDIRECT_WARPS"): 1.0,
+    ("coarseRaster", "INDIRECT_WARPS"): 1.0,
+    ("coarseRaster", "BINS"): 2.0,
+    ("coarseRaster", "STREAM_READS"): 1.0,
+}
+FITTED: dict[str, dict[str, tuple[float, float]]] = {
+    "triangleSetup": {"CLIP_WARPS": (372.7, 0.0), "SITE_WARPS": (4.77, 0.0), "FAST_WARPS": (2.09, 0.0)},
+    "binRaster": {"SLOW_WARPS": (15.52, 0.0), "ROW_ENDS": (7.45, 0.0), "WALK_STEPS": (1.68, 0.0)},
+    "coarseRaster": {"ROUNDS": (99.83, 0.0), "CASE_C_STEPS": (5.92, 0.0)},
+    "fineRaster": {
+        "WARP_STARTS": (536.75, 19.6),
+        "FRAGMENT_ROUNDS": (4.98, 26.4),
+        "PARTIAL_SEGMENTS": (98.16, 18.4),
+    },
+}
+"""Warp instructions of an event beyond those of its blocks, and the lanes that run them."""
+CHAIN_FACTOR: dict[str, dict[str, float]] = {
+    "triangleSetup": {"CLIP_WARPS": 1.3, "CLIP_STEPS": 1.3, "FAN_STEPS": 1.3},
+    "binRaster": {"LONGEST_SLOW": 1.6, "LONGEST_WALKS": 1.6},
+    "coarseRaster": {"": 1.03, "LONGEST_B": 0.6},
+}
+"""By kernel and event ("": all others): how much longer its slowest warp takes than alone."""
+Price = dict[str, Any]
+
+
+def code_of(listing: Path, kernel: str) -> dict[int, Block]:
+    """Basic blocks of one kernel by address."""
+    name = f"{kernel}Kernel"
+    functions = sass.read_functions(listing)
+    code = functions[next(f for f in functions if name in f)]
+    return {block[0].address: block for block in sass.basic_blocks(code)}
+
+
+def instructions(runs: tuple[Run, ...], code: dict[int, Block], passed: set[str]) -> tuple[Counter[str], float]:
+    """Warp instructions by class of one event, and the lanes that run them on average."""
+    total: Counter[str] = Counter()
+    lanes = 0.0
+    for run in runs:
+        for address in run.addresses:
+            for name, count in sass.classes(code[address]).items():
+                if name not in passed:
+                    total[name] += count * run.times  # type: ignore[assignment]  # fractions of a warp
+                    lanes += count * run.times * run.lanes
+    return total, lanes / max(sum(total.values()), 1e-9)
+
+
+def chain(runs: tuple[Run, ...], code: dict[int, Block], factor: float) -> Price:
+    """What the slowest warp waits for: arithmetic, and by themselves loads, atomics and barriers."""
+    price: Counter[str] = Counter()
+    for share in {min(run.times, 1.0) for run in runs if run.times > 0}:
+        here = [a for run in runs if min(run.times, 1.0) == share for a in run.addresses]
+        path = [i for address in sorted(here) for i in code[address]]
+        barriers = sum(i.opcode == "BAR" for i in path)
+        alone = sass.cycles(path, LATENCY)
+        price["chain_alu"] += share * (alone * factor + BARRIER_CYCLES * barriers) / ALU_CYCLES  # type: ignore[assignment]
+        price["chain_barrier"] += share * barriers  # type: ignore[assignment]
+        for name, opcode in (("chain_load", "LDG"), ("chain_atomic", "ATOMG")):
+            waited = sass.cycles(path, LATENCY | {opcode: LONG}) - alone
+            price[name] += share * round(waited / LONG)  # type: ignore[assignment]
+    return {name: value for name, value in price.items() if value}
+
+
+def event_prices(
+    code: dict[int, Block],
+    runs: Events,
+    chains: Events,
+    named: dict[str, str],
+    passed: set[str],
+    fitted: dict[str, tuple[float, float]],
+    factors: dict[str, float],
+) -> dict[str, Price]:
+    """Prices of all events of one kernel.
+
+    Parameters
+    ----------
+    code : dict
+        Basic blocks by address.
+    runs, chains : dict
+        What an event runs, and what its slowest warp waits for.
+    named : dict
+        The event that counts the lanes of an event.
+    passed : set of str
+        Classes that the stage counts itself.
+    fitted, factors : dict
+        Further instructions with their lanes; factors of chains.
+    """
+    out: dict[str, Price] = {}
+    for event in runs | chains | fitted:
+        total, lanes = instructions(runs.get(event, ()), code, passed)
+        extra, active = fitted.get(event, (0.0, 32.0))
+        if extra:
+            lanes = (lanes * sum(total.values()) + active * extra) / (sum(total.values()) + extra)
+            total["int32"] += extra  # type: ignore[assignment]
+        price: Price = {name: count for name, count in sorted(total.items()) if count}
+        if event in chains:
+            price |= chain(chains[event], code, factors.get(event, factors.get("", 1.0)))
+        if total:
+            price["lanes"] = named.get(event) or round(lanes, 2)
+        if extra:
+            price |= {"provenance": "fitted", "source": f"{extra:.4g} of int32, experiments.silicon.leave_one_out"}
+        out[event] = price
+    return out
+
+
+def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
+    """Prices of all events of one kernel."""
+    fitted = FITTED.get(kernel, {})
+    out = event_prices(
+        code, RUNS[kernel], CHAINS[kernel], LANES[kernel], PASSED[kernel], fitted, CHAIN_FACTOR.get(kernel, {})
+    )
+    for (of, event), loads in OWN_LOADS.items():
+        if of == kernel:
+            out[event]["load"] = out[event].get("load", 0.0) + loads
+    if kernel == "fineRaster":  # the coverage table: each value from the one before
+        out["WARP_STARTS"]["chain_alu"] += fitted.get("WARP_STARTS", (0.0, 0.0))[0]
+    return out
+
+
+def table(kernel: str, registers: int, source: str, found: dict[str, Price]) -> str:
+    """One kernel as TOML, an event a line."""
+    lines = [f"[{kernel}]", f"registers = {registers}", 'provenance = "disassembled"', f'source = "{source}"']
+    for event, price in found.items():
+        entries = [f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.5g}" for k, v in price.items()]
+        lines.append(f"{event} = {{ {', '.join(entries)} }}")
+    return "\n".join(lines) + "\n"
+
+
+def main(listing: Path) -> str:
+    """All tables."""
+    source = "RasterImpl.cu of nvdiffrast, nvcc 13.0.88, sm_90: experiments/silicon/cudaraster_blocks.py"
+    return "\n".join(
+        table(kernel, REGISTERS[kernel], source, prices(kernel, code_of(listing, kernel))) for kernel in RUNS
+    )
+
+
+if __name__ == "__main__":
+    sys.stdout.write(main(Path(sys.argv[1])))

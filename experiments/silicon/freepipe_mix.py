@@ -1,0 +1,108 @@
+"""The instruction mix of FreePipe on compute capability 9.0, written from its machine code and a few fitted numbers.
+
+    python -m experiments.silicon.freepipe_mix LISTING > simulator/mixes/freepipe/cc9.toml
+
+LISTING is ``cuobjdump -sass`` of the two kernels of shared/silicon/src/freepipe.cu, as nvcc 13.0.88 compiles it for
+sm_90 with default flags. The inner loop is unrolled four times, behind a remainder of up to three pixels. The kernel
+holds the scan twice, for triangles that need no clipping and for those that do; the first stands for both here.
+"""
+
+import sys
+from pathlib import Path
+
+from experiments.silicon import cudaraster_mix, sass
+from experiments.silicon.cudaraster_blocks import Events, Run
+from experiments.silicon.cudaraster_mix import Price
+from experiments.silicon.sass import Block
+
+REGISTERS = 58
+FUNCTIONS = {"freepipe": "_Z10k_freepipeILi0EEv6FPArgs", "freepipe_early": "_Z10k_freepipeILi1EEv6FPArgs"}
+WARPS = 8  # of a block: they begin side by side
+
+
+def _run(addresses: str, times: float = 1.0) -> tuple[Run, ...]:
+    return (Run(tuple(int(a, 16) for a in addresses.split()), times),)
+
+
+_TURN = {"freepipe": "13c0 15b0 16b0 17b0 18b0", "freepipe_early": "1590 17e0 1920 1a60 1ba0"}
+_REST = {"freepipe": "f70 1090 10d0 1200 1240 1360", "freepipe_early": "f90 1100 1140 12c0 1300 1470"}
+RUNS: dict[str, Events] = {
+    "freepipe": {
+        "WARPS": _run("0 90 1c0"),
+        "SETUP_STEPS": _run("230 2c0 300 490 4d0 610 650 780"),
+        "BOX_STEPS": _run("930 c20 c60"),
+        "ROW_STEPS": _run("e60 1390 1930"),
+        "WARP_STEPS": _run(_TURN["freepipe"], 0.25),
+        "REST_STEPS": _run(_REST["freepipe"], 1 / 3) + _run(_TURN["freepipe"], -0.25),
+        "ATOMIC": _run("1500 15f0 16f0 1800", 0.25),
+        "CLIP_WARPS": _run("19a0 19f0 1a30 1a70 1ab0 1af0 1b30 1d50 1f90 21d0"),
+    },
+    "freepipe_early": {
+        "WARPS": _run("0 90 1c0"),
+        "SETUP_STEPS": _run("230 2d0 310 4a0 4e0 620 660 790"),
+        "BOX_STEPS": _run("940 c10 c50"),
+        "ROW_STEPS": _run("ea0 14a0 14d0 1c40"),
+        "WARP_STEPS": _run(_TURN["freepipe_early"], 0.25),
+        "REST_STEPS": _run(_REST["freepipe_early"], 1 / 3) + _run(_TURN["freepipe_early"], -0.25),
+        "READS": _run("16f0 1820 1960 1ab0", 0.25),
+        "ATOMIC": _run("1770 18a0 19e0 1b30", 0.25),
+        "CLIP_WARPS": _run("1cf0 1d40 1d80 1dc0 1e00 1e40 1e80"),
+    },
+}
+CHAINS: dict[str, Events] = {
+    "freepipe": {
+        "CHAIN_ROWS": _run("e60 1390 1930"),
+        "CHAIN_STEPS": _run(_TURN["freepipe"], 0.25),
+        "CHAIN_HITS": _run("1500 15f0 16f0 1800", 0.25),
+    },
+    "freepipe_early": {
+        "CHAIN_ROWS": _run("ea0 14a0 14d0 1c40"),
+        "CHAIN_STEPS": _run(_TURN["freepipe_early"], 0.25),
+        "CHAIN_HITS": _run("16f0 1820 1960 1ab0 1770 18a0 19e0 1b30", 0.25),
+    },
+}
+_BEGINS = {"WARPS": 1 / WARPS, "SETUP_STEPS": 1 / WARPS, "BOX_STEPS": 1 / WARPS}
+LANES = {
+    "WARPS": "LANES_IN",
+    "SETUP_STEPS": "SETUP_LANES",
+    "BOX_STEPS": "SETUP_LANES",
+    "ROW_STEPS": "ROW_LANES",
+    "WARP_STEPS": "SAMPLE_TESTS",
+    "READS": "SAMPLE_HITS",
+    "ATOMIC": "ATOMIC_LANES",
+    "CLIP_WARPS": "CLIP_LANES",
+}
+FITTED: dict[str, dict[str, tuple[float, float]]] = {}
+"""Warp instructions of an event beyond those of its blocks, and the lanes that run them."""
+CHAIN_FACTOR: dict[str, dict[str, float]] = {}
+
+
+def code_of(listing: Path, kernel: str) -> dict[int, Block]:
+    """Basic blocks of one kernel by address."""
+    return {block[0].address: block for block in sass.basic_blocks(sass.read_functions(listing)[FUNCTIONS[kernel]])}
+
+
+def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
+    """Prices of all events of one kernel."""
+    begins = {e: tuple(r._replace(times=_BEGINS[e]) for r in RUNS[kernel][e]) for e in _BEGINS}
+    return cudaraster_mix.event_prices(
+        code,
+        RUNS[kernel],
+        CHAINS[kernel] | begins,
+        LANES,
+        {"atomic"},
+        FITTED.get(kernel, {}),
+        CHAIN_FACTOR.get(kernel, {}),
+    )
+
+
+def main(listing: Path) -> str:
+    """Both tables."""
+    source = "shared/silicon/src/freepipe.cu, nvcc 13.0.88, sm_90: experiments/silicon/freepipe_mix.py"
+    return "\n".join(
+        cudaraster_mix.table(kernel, REGISTERS, source, prices(kernel, code_of(listing, kernel))) for kernel in RUNS
+    )
+
+
+if __name__ == "__main__":
+    sys.stdout.write(main(Path(sys.argv[1])))
