@@ -1,5 +1,7 @@
 """Scenes of the frontier of the methods: two waving sheets that cut through one another, of triangles of one area."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,50 @@ SHEETS = ((17.0, 1.0, (0.95, 0.55, 0.25)), (-38.0, -1.0, (0.25, 0.55, 0.95)))  #
 JITTER = 0.18  # of a leg of a triangle, by which its corners are moved
 RELIEF = 0.05  # depth of the waves, of the range -1 to 1
 TEXELS = 64  # along the texture
+AREAS = (0.1, 1.0, 10.0, 100.0, 1000.0)  # pixels a triangle
+SIZE, SMALL = (192, 144), (96, 72)  # pixels; the small one where triangles are smallest, and a million otherwise
+LATTICE = (128, 64)  # pixels: powers of two, so that the corners are exact in clip space
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scene at a size.
+
+    Parameters
+    ----------
+    name : str
+    scene : Scene
+    width, height : int
+        Pixels.
+    matrix : ndarray, (4, 4)
+        Model to clip space; the identity for what is in clip space already.
+    """
+
+    name: str
+    scene: Scene
+    width: int
+    height: int
+    matrix: NDArray[np.float64]
+
+
+def subjects() -> list[Subject]:
+    """Sheets of all areas, and a model of triangles."""
+    made = []
+    for area in AREAS:
+        size = SMALL if area < 1.0 else SIZE
+        made.append(Subject(f"{area:g} px", sheets(area, *size), *size, np.eye(4)))
+    return [*made, Subject("spot", real("spot", *SIZE), *SIZE, np.eye(4))]
+
+
+def patches(name: str = "teapot") -> Subject:
+    """A model of patches."""
+    scene = load_scene(name)
+    return Subject(f"{name}, patches", scene, *SIZE, scene.views["default"].matrix(*SIZE))
+
+
+def textured_subject() -> Subject:
+    """The textured sheet, of triangles of 100 pixels."""
+    return Subject("textured", textured(100.0, *SIZE), *SIZE, np.eye(4))
 
 
 def sheets(area: float, width: int, height: int, *, count: int = 2, seed: int = 7) -> Scene:
@@ -46,6 +92,20 @@ def textured(area: float, width: int, height: int) -> Scene:
     ids = np.zeros(len(mesh.triangles), np.int32)
     white = np.ones_like(mesh.colors)
     return _scene(f"textured sheet of {area:g} px", mesh.positions, mesh.triangles, white, uvs, ids, (_checker(),))
+
+
+def lattice() -> Subject:
+    """A flat square grid, 4 pixels a cell, whose corners are centres of pixels: every edge runs through samples."""
+    width, height = LATTICE
+    x, y = np.meshgrid(np.arange(-3.5, width + 4, 4), np.arange(-3.5, height + 4, 4))
+    positions = np.ones((x.size, 4), np.float32)
+    positions[:, 0], positions[:, 1], positions[:, 2] = 2 * x.ravel() / width - 1, 2 * y.ravel() / height - 1, 0
+    columns, rows = x.shape[1], x.shape[0]
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
+    triangles = np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3).astype(np.int32)
+    colors = np.ones((x.size, 4), np.float32)
+    return Subject("lattice", _scene("lattice", positions, triangles, colors), width, height, np.eye(4))
 
 
 def real(name: str, width: int, height: int) -> Scene:

@@ -1,0 +1,207 @@
+"""Frontier of the methods: modelled milliseconds of every pipeline against the error of its picture.
+
+Set TILESTAMP_FRONTIER=long for all pipelines and variants (minutes: most of it is compiling).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from experiments.frontier.methods_notes import notes
+from experiments.frontier.methods_scenes import Subject, lattice, patches, subjects, textured_subject
+from experiments.frontier.methods_truth import Truth
+from experiments.frontier.methods_variants import (
+    ALL_PATCHES,
+    ALL_TRIANGLES,
+    FILTERED,
+    QUICK_PATCHES,
+    QUICK_TRIANGLES,
+    Variant,
+)
+from experiments.frontier.model_frames import is_long
+from experiments.frontier.pareto import pareto_front
+from experiments.frontier.picture_error import depth_errors, flip, pixel_errors
+from experiments.registry import Progress
+from experiments.result import Cell, Figure, Result
+from models.errors import TilestampError
+from reports.methods_plot import panels, side_by_side
+from simulator.run import Run
+from simulator.simulation import simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SOURCE = (
+    "Truth: our own exact rasterizer (simulator/reference): rational coverage, double precision, 256 samples a pixel "
+    "for the converged picture. Cost: the model's milliseconds"
+)
+MACHINES = ("h200", "gtx480")  # today's, and one of the papers'
+NO_TIME = float("nan")
+MEASURES = {
+    "flip": ("FLIP (0: the converged picture)", "Error that an eye sees"),
+    "wrong": ("share of wrong pixels", "Pixels of a wrong triangle or patch"),
+}
+WORST = 3  # pictures shown of those that are furthest off
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A variant's picture of a subject, kept for the figures."""
+
+    subject: Subject
+    variant: Variant
+    run: Run
+    truth: Truth
+
+
+def run(progress: Progress) -> Result:
+    """Draw every scene by every variant, and compare."""
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    worst: dict[str, tuple[float, Drawn]] = {}
+    for subject, variants in _grid():
+        progress(f"frontier/methods: {subject.name}")
+        truth = Truth(subject)
+        for variant in variants:
+            drawn = Drawn(subject, variant, _run(subject, variant, MACHINES[0]), truth)
+            row = _row(drawn)
+            rows += [row | {"machine": machine, "ms": ms} for machine, ms in _milliseconds(drawn)]
+            if row["flip"] > worst.get(variant.pipeline, (0.0, None))[0]:
+                worst[variant.pipeline] = row["flip"], drawn
+    table = pd.DataFrame(rows)
+    table = _mark_fronts(table)
+    doubles = _doubles(progress)
+    return Result(
+        "frontier-methods",
+        "What a picture costs: modelled milliseconds of every method against the error of its picture",
+        SOURCE,
+        _cells(table),
+        _figures(table, worst),
+        notes(table, doubles),
+        [],
+        {"methods": table, "double-hits": doubles},
+    )
+
+
+def _grid() -> Iterator[tuple[Subject, list[Variant]]]:
+    """Scenes, and what draws each."""
+    for subject in subjects():
+        yield subject, ALL_TRIANGLES if is_long() else QUICK_TRIANGLES
+    yield patches(), ALL_PATCHES if is_long() else QUICK_PATCHES
+    yield textured_subject(), FILTERED if is_long() else [v for v in FILTERED if v.pipeline == "tiled"]
+
+
+def _run(subject: Subject, variant: Variant, machine: str) -> Run:
+    return simulate(
+        subject.scene,
+        variant.pipeline,
+        machine,
+        width=subject.width,
+        height=subject.height,
+        camera=subject.matrix,
+        **variant.options,
+    )
+
+
+def _row(drawn: Drawn) -> dict[str, Any]:
+    """Errors of one picture."""
+    variant, frame = drawn.variant, drawn.run.frame
+    row: dict[str, Any] = {
+        "scene": drawn.subject.name,
+        "pipeline": variant.pipeline,
+        "method": variant.label,
+        "flip": flip(drawn.truth.picture(variant.pipeline), frame.image),
+    }
+    made = drawn.truth.geometry(variant.pipeline)
+    if frame.triangle_ids is None or made.ids is None:
+        return row
+    seen = drawn.truth.visible(variant)
+    if drawn.subject.scene.patches is not None:  # the pipeline dices otherwise than the reference: compare patches
+        return row | {"wrong": float((frame.triangle_ids != np.append(made.ids, -1)[seen.ids]).mean())}
+    right = (frame.triangle_ids == seen.ids) & (seen.ids >= 0)
+    steps = depth_errors(variant.pipeline, variant.options, frame.depth[right], seen.depth[right])
+    return row | {
+        **pixel_errors(frame.triangle_ids, seen, made.corners, made.depths)._asdict(),
+        "depth_median_ulp": float(np.median(steps)) if steps.size else NO_TIME,
+        "depth_worst_ulp": float(steps.max()) if steps.size else NO_TIME,
+    }
+
+
+def _milliseconds(drawn: Drawn) -> Iterator[tuple[str, float]]:
+    """Time on each machine; not a number where the machine has no instruction mix of the pipeline."""
+    yield MACHINES[0], drawn.run.milliseconds
+    for machine in MACHINES[1:]:
+        try:
+            yield machine, _run(drawn.subject, drawn.variant, machine).milliseconds
+        except TilestampError:
+            yield machine, NO_TIME
+
+
+def _mark_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Add whether anything beats a row in both, of its scene and machine, by FLIP and by wrong pixels."""
+    for error in MEASURES:
+        table[f"front_{error}"] = False
+        for _, rows in table.groupby(["scene", "machine"], sort=False):
+            table.loc[rows.index, f"front_{error}"] = pareto_front(rows["ms"], rows[error])
+    return table
+
+
+def _doubles(progress: Progress) -> "pd.DataFrame":
+    """Hits beyond the first of each sample where every edge runs through samples, and samples without a hit."""
+    import pandas as pd
+
+    subject = lattice()
+    progress("frontier/methods: edges on samples")
+    rows = []
+    for variant in ALL_TRIANGLES if is_long() else QUICK_TRIANGLES:
+        if variant.options.get("msaa", 1) > 1 or variant.options.get("spp", 1) > 1:
+            continue
+        drawn = _run(subject, variant, MACHINES[0])
+        hits = sum(count for name, count in drawn.counts.items() if name.endswith("SAMPLE_HITS"))
+        ids = drawn.triangle_ids
+        covered = int((ids >= 0).sum()) if ids is not None else 0
+        rows.append(
+            {"method": variant.label, "samples": ids.size if ids is not None else 0, "covered": covered,
+             "double_hits": hits - covered}
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _cells(table: "pd.DataFrame") -> list[Cell]:
+    """Best and cheapest of each scene on the first machine: what the front runs between."""
+    cells = []
+    for scene, rows in table[table.machine == MACHINES[0]].groupby("scene", sort=False):
+        front = rows[rows.front_flip].sort_values("ms")
+        for column, point in (("cheapest", front.iloc[0]), ("least FLIP", front.iloc[-1])):
+            cells.append(Cell(f"{scene}: {point.method}", f"{column}, time", "ms", None, float(point.ms), "reported"))
+            cells.append(Cell(f"{scene}: {point.method}", f"{column}, FLIP", "", None, float(point.flip), "reported"))
+    return cells
+
+
+def _figures(table: "pd.DataFrame", worst: dict[str, tuple[float, Drawn]]) -> list[Figure]:
+    """Fronts by machine and measure, and the pictures that are furthest off."""
+    figures = [_front(table, machine, error) for machine in MACHINES for error in MEASURES]
+    ranked = sorted(worst.values(), key=lambda kept: -kept[0])[:WORST]
+    return figures + [Figure(f"worst-{drawn.variant.pipeline}", partial(_draw_worst, drawn)) for _, drawn in ranked]
+
+
+def _front(table: "pd.DataFrame", machine: str, error: str) -> Figure:
+    """Time against one measure of error, a panel a scene."""
+    rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
+    words, title = MEASURES[error]
+    draw = partial(
+        panels, rows.assign(front=rows[f"front_{error}"]), panel="scene", group="pipeline", x="ms", y=error,
+        front="front", x_label="modelled time [ms]", y_label=words, title=f"{title} against modelled time, {machine}",
+    )  # fmt: skip
+    return Figure(f"{machine}-{error}", draw)
+
+
+def _draw_worst(drawn: Drawn, path: Path) -> None:
+    """Exact picture, the method's, and their difference."""
+    truth = drawn.truth.picture(drawn.variant.pipeline)
+    side_by_side(truth, drawn.run.image / 255.0, path, title=f"{drawn.variant.label}: {drawn.subject.name}")

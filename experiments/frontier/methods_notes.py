@@ -1,0 +1,95 @@
+"""Sentences of the frontier of the methods, all computed from its table."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NOTHING = 5e-5  # of a FLIP error: less is a tie
+
+
+def notes(table: "pd.DataFrame", doubles: "pd.DataFrame") -> list[str]:
+    """Which methods are on a front, which never are and what beats them, and how they err."""
+    lines = [_range(table)]
+    for machine, rows in table[table.ms.notna()].groupby("machine", sort=False):
+        lines += [_on_front(str(machine), rows), *_dominated(str(machine), rows)]
+        missing = sorted(set(table.pipeline) - set(rows.pipeline))
+        if missing:
+            lines.append(f"Without a time on {machine}, for want of an instruction mix: {', '.join(missing)}.")
+    return [*lines, *_pixels(table), *_depths(table), *_doubles(doubles)]
+
+
+def _range(table: "pd.DataFrame") -> str:
+    return (
+        f"{table.method.nunique()} variants of {table.pipeline.nunique()} pipelines on {table.scene.nunique()} scenes; "
+        "every time is modelled, every error is against the exact rasterizer at the same samples, and FLIP against "
+        "the converged picture in the pipeline's own shading, so a method is not charged for its taste in colours. "
+        "Pictures are small, so launches weigh more than in a game's frame."
+    )
+
+
+def _on_front(machine: str, rows: "pd.DataFrame") -> str:
+    """Variants on the front of time and FLIP, by the number of scenes."""
+    counts = rows[rows.front_flip].groupby("method").scene.nunique().sort_values(ascending=False)
+    drawn = rows.groupby("method").scene.nunique()
+    named = ", ".join(f"{name} ({count} of {drawn[name]})" for name, count in counts.items())
+    return f"On the front of time and FLIP on {machine}, by scenes: {named}."
+
+
+def _dominated(machine: str, rows: "pd.DataFrame") -> list[str]:
+    """Pipelines that no scene has on a front, and an example of what beats them."""
+    lines = []
+    for pipeline, of_pipeline in rows.groupby("pipeline", sort=False):
+        if of_pipeline.front_flip.any():
+            continue
+        best = of_pipeline.sort_values(["flip", "ms"]).iloc[0]
+        rivals = rows[(rows.scene == best.scene) & (rows.ms <= best.ms) & (rows.flip <= best.flip)]
+        rival = rivals[rivals.front_flip].sort_values("ms").iloc[0]
+        lines.append(
+            f"Dominated on {machine} in every scene: {pipeline}. At its best ({best.method}, {best.scene}: "
+            f"{best.ms:.3g} ms, FLIP {best.flip:.4f}) it meets {rival.method} ({rival.ms:.3g} ms, {rival.flip:.4f})."
+        )
+    return lines
+
+
+def _pixels(table: "pd.DataFrame") -> list[str]:
+    """Wrong pixels by pipeline, holes and spills."""
+    first = table[(table.machine == table.machine.iloc[0]) & table.wrong.notna()]
+    lines = []
+    for scene in ("0.1 px", "1000 px"):
+        rows = first[first.scene == scene]
+        if rows.empty:
+            continue
+        best = rows.groupby("pipeline").wrong.min().sort_values()
+        named = ", ".join(f"{pipeline} {100 * share:.3g} %" for pipeline, share in best.items())
+        lines.append(f"Wrong pixels where triangles have {scene}, the best variant of each: {named}.")
+    holes = first[(first.holes > 0) | (first.spills > 0)]
+    if len(holes):
+        worst = holes.sort_values("holes").iloc[-1]
+        lines.append(
+            f"{len(holes)} of {len(first)} pictures have a pixel of a surface clearly behind or before the right one; "
+            f"most holes: {worst.method}, {worst.scene}, {100 * worst.holes:.3g} % of the pixels."
+        )
+    return lines
+
+
+def _depths(table: "pd.DataFrame") -> list[str]:
+    """Depth errors of the formats."""
+    first = table[(table.machine == table.machine.iloc[0]) & table.depth_median_ulp.notna()]
+    grouped = first.groupby("method", sort=False)[["depth_median_ulp", "depth_worst_ulp"]]
+    worst = grouped.agg({"depth_median_ulp": "median", "depth_worst_ulp": "max"})
+    named = "; ".join(
+        f"{name} {row.depth_median_ulp:.2g} / {row.depth_worst_ulp:.2g}" for name, row in worst.iterrows()
+    )
+    return [f"Depth in units of the last place of its own format, median / worst over all scenes: {named}."]
+
+
+def _doubles(doubles: "pd.DataFrame") -> list[str]:
+    """Double hits where edges run through samples."""
+    twice = doubles[doubles.double_hits > 0]
+    clean = sorted(set(doubles.method) - set(twice.method))
+    lines = [f"Edges through samples: every sample once with {', '.join(clean)}."] if clean else []
+    if len(twice):
+        named = ", ".join(f"{row.method} {row.double_hits} of {row.samples}" for row in twice.itertuples())
+        lines.append(f"Samples on a shared edge drawn more than once: {named}.")
+    return lines

@@ -1,0 +1,86 @@
+"""What the frontier of the methods compares: pipelines with options, each with a name for the plots."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+FORMATS = ("fixed16", "fixed24", "fixed32", "float32")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A pipeline with options.
+
+    Parameters
+    ----------
+    pipeline : str
+    name : str
+        Of the options, in a few words.
+    options : dict
+    """
+
+    pipeline: str
+    name: str
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """Pipeline and options."""
+        return f"{self.pipeline}, {self.name}" if self.name else self.pipeline
+
+
+BOTH_SIDES = {"cull_backfaces": False}
+HARDWARE = [
+    Variant("hardware", f"{bits} bits, {depth}", {"bits": bits, "depth_format": depth, **BOTH_SIDES})
+    for bits in (4, 8)
+    for depth in FORMATS
+]
+CUDARASTER = [
+    Variant("cudaraster", f"{samples} spp" if samples > 1 else "", {"msaa": samples, **BOTH_SIDES})
+    for samples in (1, 2, 4, 8)
+]
+FREEPIPE = [
+    Variant("freepipe", "64-bit words"),
+    Variant("freepipe", "64-bit words, early z", {"early": True}),
+    Variant("freepipe", "32-bit words", {"packing": "32"}),
+]
+TILED = [Variant("tiled", f"tile {tile}", {"tile": tile, **BOTH_SIDES}) for tile in (4, 8, 16, 32)]
+PER_PRIMITIVE = [
+    Variant("per-primitive", "as written", {"race": True}),
+    Variant("per-primitive", "without its race", {"race": False}),
+]
+BINNED = [
+    Variant("binned", "", dict(BOTH_SIDES)),
+    Variant("binned", "all fragments", {"fragments_a_pixel": 0, **BOTH_SIDES}),
+]
+STAMPS = [
+    Variant("stamps", f"stamp {stamp}, {spp} spp", {"stamp": stamp, "spp": spp})
+    for stamp, spp in ((2, 1), (4, 1), (8, 1), (4, 4), (4, 16))
+]
+ACROSS = [Variant("across-polygons", f"{spp} spp", {"spp": spp}) for spp in (1, 4, 16)]
+BIT_MASK = [
+    Variant("bit-mask", f"{mask}, {spp} spp", {"mask": mask, "spp": spp})
+    for mask, spp in (("plain", 1), ("facing", 1), ("depth", 1), ("depth", 4))
+]
+MICROPOLYGON = [
+    Variant("micropolygon", f"tile {tile}, bound {bound}, {spp} spp", {"tile": tile, "bound": bound, "spp": spp})
+    for tile, bound, spp in (
+        (8, 4, 1), (16, 4, 1), (32, 4, 1), (8, 4, 4), (8, 4, 16), (8, 8, 1), (16, 8, 1), (16, 8, 4), (8, 2, 1),
+    )
+] + [Variant("micropolygon", "bound 4, fixed function", {"bound": 4, "hybrid": True})]  # fmt: skip
+FILTERED = [
+    Variant(pipeline, f"{texture_filter} texels", {"texture_filter": texture_filter, **BOTH_SIDES})
+    for pipeline, filters in (
+        ("tiled", ("nearest", "bilinear")),
+        ("per-primitive", ("nearest", "bilinear")),
+        ("binned", ("nearest", "bilinear", "trilinear")),
+    )
+    for texture_filter in filters
+]
+
+# Kernels of these are compiled by other experiments of the first run; the others would add minutes of compiling
+QUICK_TRIANGLES = [*HARDWARE, CUDARASTER[0], *FREEPIPE, *TILED]
+QUICK_PATCHES = MICROPOLYGON
+ALL_TRIANGLES = [
+    *HARDWARE, *CUDARASTER, *FREEPIPE, *TILED, *PER_PRIMITIVE, *BINNED, *STAMPS, *ACROSS, *BIT_MASK,
+]  # fmt: skip
+ALL_PATCHES = [*MICROPOLYGON, *STAMPS, *ACROSS, *BIT_MASK]

@@ -1,0 +1,117 @@
+"""Small multiples of cost against error, and a picture beside the true one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.frontier_plot import MARKERS
+from reports.style import PALETTE, figure
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = 3
+AMPLIFIED = 4.0  # differences are shown so many times as large
+
+
+def panels(
+    table: "pd.DataFrame",
+    path: Path,
+    *,
+    panel: str,
+    group: str,
+    x: str,
+    y: str,
+    front: str,
+    x_label: str,
+    y_label: str,
+    title: str,
+) -> None:
+    """Draw a panel for each value of ``panel``, a colour and mark for each of ``group``, the front as steps.
+
+    Parameters
+    ----------
+    table : DataFrame
+        A row a point; an error of zero is drawn at the foot of its panel.
+    path : Path
+        PNG to write.
+    panel, group, x, y, front : str
+        Columns; ``front`` is bool.
+    """
+    names = list(dict.fromkeys(table[panel]))
+    groups = list(dict.fromkeys(table[group]))
+    rows = -(-len(names) // COLUMNS)
+    size = (4.1 * COLUMNS, 3.3 * rows + 0.9)
+    with figure(path, title, nrows=rows, ncols=COLUMNS, figsize=size, squeeze=False) as grid:
+        for axes, name in zip(grid.flat, names, strict=False):
+            _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, front)
+        for axes in grid.flat[len(names) :]:
+            axes.set_axis_off()
+        for axes in grid[:, 0]:
+            axes.set_ylabel(y_label, fontsize=8)
+        for column in range(min(COLUMNS, len(names))):
+            last = grid[(len(names) - 1 - column) // COLUMNS, column]
+            last.set_xlabel(x_label, fontsize=8)
+        handles = [_mark(k) for k in range(len(groups))]
+        grid[0, 0].figure.legend(
+            [*handles, _line()], [*groups, "front"], loc="lower center", ncols=min(len(groups) + 1, 6), fontsize=8,
+            bbox_to_anchor=(0.5, -0.005 - 0.03 * (len(groups) > 5)),
+        )  # fmt: skip
+
+
+def _panel(
+    axes: Any, rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, front: str
+) -> None:
+    positive = rows[y][rows[y] > 0]
+    foot = 10.0 ** np.floor(np.log10(positive.min()) - 0.3) if len(positive) else 1e-6
+    heights = rows[y].where(rows[y] > 0, foot)
+    for index, key in enumerate(groups):
+        mine = rows[group] == key
+        axes.plot(rows[x][mine], heights[mine], **_style(index))
+    best = rows.assign(height=heights)[rows[front]].sort_values([x, "height"])
+    axes.step(best[x], best["height"], where="post", color="black", linewidth=0.9)
+    axes.set(xscale="log", yscale="log")
+    axes.set_title(name, fontsize=9)
+    axes.tick_params(labelsize=7)
+    if (rows[y] <= 0).any():
+        axes.annotate("none", (0.01, foot), xycoords=("axes fraction", "data"), fontsize=7, va="bottom")
+
+
+def _style(index: int) -> dict[str, Any]:
+    color = PALETTE[index % len(PALETTE)]
+    marker = MARKERS[(index + index // len(PALETTE)) % len(MARKERS)]
+    return {"marker": marker, "linestyle": "none", "markersize": 5, "color": color, "alpha": 0.85}
+
+
+def _mark(index: int) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **_style(index))
+
+
+def _line() -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color="black", linewidth=0.9)
+
+
+def side_by_side(truth: NDArray[np.float64], image: NDArray[np.float64], path: Path, *, title: str) -> None:
+    """Draw the true picture, another, and the difference, amplified.
+
+    Parameters
+    ----------
+    truth, image : ndarray, (H, W, 3)
+        In [0, 1].
+    path : Path
+        PNG to write.
+    """
+    height, width = truth.shape[:2]
+    difference = np.clip(AMPLIFIED * np.abs(truth - image), 0.0, 1.0)
+    shown = (("exact, converged", truth), ("the method", image), (f"difference, {AMPLIFIED:g} times", difference))
+    with figure(path, title, ncols=3, figsize=(12.0, 4.0 * height / width + 0.7)) as row:
+        for axes, (name, picture) in zip(row, shown, strict=True):
+            axes.imshow(np.clip(picture, 0.0, 1.0), interpolation="nearest")
+            axes.set_title(name, fontsize=9)
+            axes.set_axis_off()
