@@ -191,6 +191,11 @@ def test_in_api_order_the_newest_four_are_enough():
     assert pixels == 0
 
 
+def test_four_layers_of_whole_quads_outgrow_the_fragment_stream():
+    assert kept_fragments.beyond_the_stream(3) == 0
+    assert kept_fragments.beyond_the_stream(4) > 0
+
+
 @pytest.mark.parametrize("name", resident_blocks.MACHINES)
 def test_compaction_takes_as_many_triangles_as_threads_are_resident(name):
     most = most_triangles(load_machine(name))

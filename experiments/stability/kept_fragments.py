@@ -15,6 +15,7 @@ from experiments.stability.boundary import Boundary, atlas_result, bisect
 from experiments.stability.layers import layered
 from reports.plots import lines
 from simulator.simulation import simulate
+from simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, OVERDRAW
 from simulator.stages.zhang2025.rop import KEPT
 
 if TYPE_CHECKING:
@@ -54,6 +55,16 @@ def boundary(order: str) -> tuple[float | None, float | None]:
     return bisect(lambda layers: lost(int(layers), order)[1] > 0, LAYERS[0], LAYERS[-1], scale="integer")
 
 
+def beyond_the_stream(layers: int) -> int:
+    """Fragments that the stream between pixel shader and ROP has no room for in the original; here it grows."""
+    return int(frame(layers, "oit").frame.facts["fragments beyond the stream's room"])
+
+
+def stream_boundary() -> tuple[float | None, float | None]:
+    """Layers whose fragments fit the stream, and layers whose do not."""
+    return bisect(lambda layers: beyond_the_stream(int(layers)) > 0, LAYERS[0], LAYERS[-1], scale="integer")
+
+
 def run(progress: Progress) -> Result:
     """Add layers."""
     import pandas as pd
@@ -67,6 +78,18 @@ def run(progress: Progress) -> Result:
             rows.append((layers, order, fragments, 100 * pixels / SIZE**2, *times))
     table = pd.DataFrame(rows, columns=["layers", "order", "fragments lost", "wrong", "four_ms", "all_ms"])
     boundaries = [_boundary(table, order) for order in ORDERS]
+    boundaries.append(
+        Boundary(
+            "binned, fragment stream",
+            "layers over the screen",
+            "",
+            *stream_boundary(),
+            f"{beyond_the_stream(LAYERS[-1])} fragments at {LAYERS[-1]} layers lie beyond its room of {OVERDRAW} a pixel"
+            " (a quad takes four)",
+            "let it grow, as here",
+            f"{4 * FRAGMENT_OUT_BYTES} bytes a quad",
+        )
+    )
     figures = [Figure("wrong", lambda path: _plot(table, path))]
     return atlas_result(
         "stability/kept_fragments", "Four fragments a pixel", boundaries, figures, [], {"layers": table}
