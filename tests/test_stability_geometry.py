@@ -87,17 +87,21 @@ def test_the_guard_band_of_1_1_is_what_nvdiffrast_has_not():
     assert clipping.clips("nvdiffrast", 0.5)
 
 
-def test_a_depth_evaluated_twice_leaves_holes_in_a_tilted_plane():
-    assert depth_twice.holes(0.01) <= depth_twice.WRONG
-    assert depth_twice.holes(0.02) > depth_twice.WRONG
+@pytest.mark.parametrize(
+    ("way", "holds", "breaks"), [(depth_twice.STEPPED, 1e-9, 1e-7), (depth_twice.CONTRACTED, 0.01, 0.02)]
+)
+def test_a_depth_evaluated_twice_leaves_holes_in_a_tilted_plane(way, holds, breaks):
+    assert depth_twice.holes(holds, way=way) <= depth_twice.WRONG
+    assert depth_twice.holes(breaks, way=way) > depth_twice.WRONG
 
 
-def test_a_slack_of_one_step_closes_every_hole():
-    assert depth_twice.needed_slack(0.5) == 1
-    assert depth_twice.holes(0.5, slack=1) == 0.0
+@pytest.mark.parametrize(("way", "slack"), [(depth_twice.STEPPED, 2), (depth_twice.CONTRACTED, 1)])
+def test_a_slack_of_a_step_or_two_closes_every_hole(way, slack):
+    assert depth_twice.holes(0.5, slack=slack - 1, way=way) > 0.0
+    assert depth_twice.holes(0.5, slack=slack, way=way) == 0.0
 
 
-@pytest.mark.parametrize(("slack", "holds", "breaks"), [(0, 1.2e-7, 5e-8), (1, 2.4e-7, 1.1e-7), (1678, 1.02e-4, 1e-4)])
+@pytest.mark.parametrize(("slack", "holds", "breaks"), [(0, 1.2e-7, 5e-8), (2, 3e-7, 1.5e-7), (1678, 1.02e-4, 1e-4)])
 def test_a_slack_loses_the_order_of_surfaces_closer_than_it(slack, holds, breaks):
     assert not depth_twice.loses_order(holds, slack)
     assert depth_twice.loses_order(breaks, slack)
