@@ -1,7 +1,7 @@
 """The sampler of a run: it has a stage execute part of its units, and more of them until the answer is close enough."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -46,7 +46,10 @@ class Sampler:
         self,
         size: NDArray[Any],
         execute: Callable[[Integers], Work],
-        streams: Callable[[Integers], tuple[Stream, ...]],
+        streams: Callable[[Integers], tuple[Stream, ...]] = lambda _: (),
+        more: Sequence[NDArray[Any]] = (),
+        *,
+        key: int | None = None,
     ) -> Work:
         """Run a stage on a part of its units.
 
@@ -58,13 +61,17 @@ class Sampler:
             Runs the units of the given indices; its ``Work`` has a row for each.
         streams : callable
             The buffers touched, by the rows of all units.
+        more : sequence of ndarray, (units,)
+            Further things known, of which some events may be proportional.
+        key : int, optional
+            Stages with the same key and sizes draw the same units first.
 
         Returns
         -------
         Work
             With a row for every unit, and the ``sample``.
         """
-        strata = make_strata(size, [self.seed, len(self.executed)])
+        strata = make_strata(size, [self.seed, len(self.executed) if key is None else key], *more)
         taken = pilot(strata)
         begin = time.process_time()
         work = execute(drawn(strata, taken))
@@ -72,10 +79,11 @@ class Sampler:
         for left in reversed(range(ROUNDS)):
             if self.precise(sample, work):
                 break
-            more = enlarged(sample, self.measures(work, sample.rows), self.error) if left else strata.units
-            sample = _grown(sample, more, execute)
+            taken = enlarged(sample, self.measures(work, sample.rows), self.error) if left else strata.units
+            sample = _grown(sample, taken, execute)
         spent = time.process_time() - begin
-        ran, all_sizes = strata.size[drawn(strata, sample.taken)].sum(), strata.size.sum()
+        size = strata.known[:, 1]
+        ran, all_sizes = size[drawn(strata, sample.taken)].sum(), size.sum()
         self.seconds_saved += spent * (all_sizes / ran - 1) if ran else 0.0
         self.executed[work.kernel] = (int(sample.taken.sum()), len(strata.order))
         table = expanded(sample)

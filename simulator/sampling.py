@@ -2,9 +2,10 @@
 
 Before a stage runs, something cheap is known about each of its units: the length of a tile's list, the visible
 triangles of a block. Units are cut into strata of nearly equal size by it. The largest units are a certainty stratum:
-they always run, so that the schedule sees the worst imbalance as it is. In every other stratum a random part runs; a
-total is then estimated by the ratio of what those units did to their size (Cochran 1977, Sampling Techniques, chapters
-5 and 6), with the finite-population correction: when all have run, the interval has no width.
+they always run, so that the schedule sees the worst imbalance as it is. In every other stratum a random part runs. What
+those units did is predicted by what was known of them, by least squares; a total is the prediction for all units and,
+stratum by stratum, the mean of what it misses (the regression estimator: Cochran 1977, Sampling Techniques, chapters
+5 to 7), with the finite-population correction: when all have run, the interval has no width.
 
 Everything here is a pure function of sizes, rows and a seed.
 """
@@ -18,8 +19,10 @@ from numpy.typing import NDArray
 CERTAIN = 24  # largest units, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum
 FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
+ENOUGH = 12  # units that ran for each thing known, before rows are predicted by them
 PILOT = 96  # units that the first sample draws in proportion to size, and ...
 PILOT_EACH = 5  # ... at least from each stratum
+PRIOR = 1.0  # degrees of freedom that the spread usual in other strata counts for
 GENEROUS = 1.15  # of the units that the error seems to ask for: a spread is itself an estimate
 _QUANTILES = np.array([12.706, 4.303, 3.182, 2.776])  # of t at 97.5 %, for 1 to 4 degrees of freedom
 _Z = 1.959964
@@ -65,15 +68,15 @@ class Strata:
 
     Parameters
     ----------
-    size : ndarray, (units,), float64
-        What is known of each unit.
+    known : ndarray, (units, p), float64
+        What is known of each unit: 1, its size, and more; each in units of its mean.
     order : ndarray, (units,), int64
         Units, stratum after stratum, in random order inside each: a sample is a prefix of each stratum.
     first : ndarray, (strata + 1,), int64
         Where each stratum starts in ``order``.
     """
 
-    size: Floats
+    known: Floats
     order: Integers
     first: Integers
 
@@ -82,14 +85,8 @@ class Strata:
         """Units of each stratum."""
         return np.diff(self.first)
 
-    @property
-    def scale(self) -> Floats:
-        """Regressor of each unit in ``order``: its size, or 1 in a stratum of units without any."""
-        size = self.size[self.order]
-        empty = np.repeat(self._sums(size) == 0, self.units)
-        return np.where(empty, 1.0, size)
-
-    def _sums(self, values: Floats) -> Floats:
+    def sums(self, values: Floats) -> Floats:
+        """Sums by stratum of values in ``order``."""
         return np.array([part.sum() for part in np.split(values, self.first[1:-1])])
 
 
@@ -125,7 +122,7 @@ def t_quantile(freedom: Floats) -> Floats:
     return np.where(nu <= len(_QUANTILES), small, series)
 
 
-def make_strata(size: NDArray[np.generic], seed: list[int]) -> Strata:
+def make_strata(size: NDArray[np.generic], seed: list[int], *more: NDArray[np.generic]) -> Strata:
     """Cut units into strata by size, and shuffle each.
 
     Parameters
@@ -133,12 +130,15 @@ def make_strata(size: NDArray[np.generic], seed: list[int]) -> Strata:
     size : ndarray, (units,)
         Not negative.
     seed : list of int
+    *more : ndarray, (units,)
+        Further things known, of which some events may be proportional.
     """
-    known = size.astype(np.float64)
-    ascending = np.argsort(known, kind="stable")
+    columns = [np.ones(len(size)), *(column.astype(np.float64) for column in (size, *more))]
+    known = np.stack([column / (column.mean() or 1.0) for column in columns], axis=1)
+    ascending = np.argsort(known[:, 1], kind="stable")
     split = max(0, len(known) - CERTAIN)
     rest, certain = ascending[:split], ascending[split:]
-    cuts = _cuts(known[rest])
+    cuts = _cuts(known[rest, 1])
     random = np.random.default_rng(seed)
     parts = [certain, *(random.permutation(part) for part in np.split(rest, cuts) if len(part))]
     first = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
@@ -160,9 +160,9 @@ def _cuts(size: Floats) -> Integers:
 
 def pilot(strata: Strata) -> Integers:
     """Units that the first sample takes of each stratum."""
-    total = strata._sums(strata.size[strata.order])  # noqa: SLF001 - the same module
+    total = strata.sums(strata.known[strata.order, 1])
     share = total / max(total[1:].sum(), 1e-300)
-    taken = np.minimum(strata.units, np.maximum(PILOT_EACH, np.ceil(PILOT * share))).astype(np.int64)
+    taken: Integers = np.minimum(strata.units, np.maximum(PILOT_EACH, np.ceil(PILOT * share))).astype(np.int64)
     taken[0] = strata.units[0]
     return taken
 
@@ -180,29 +180,43 @@ def _places(strata: Strata, taken: Integers) -> Integers:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Ratios, residual spreads and what they add to the variance, by stratum: (strata, k) each."""
+    """What rows are predicted to be, and how far they are from it."""
 
-    ratio: Floats
-    spread: Floats  # residual variance of a unit
+    predicted: Floats  # (units, k) of all units, in ``order``, by what is known of them
+    residual: Floats  # (units that ran, k) less the prediction
+    mean: Floats  # (strata, k) of the residuals
+    spread: Floats  # (strata, k) their variance
     weight: Floats  # (strata,) variance of a total by unit variance: N^2 (1 - n / N) / n
     taken: Integers
 
 
 def _fit(sample: Sample, values: Floats) -> _Fit:
     strata, taken = sample.strata, sample.taken
-    scale = strata.scale
-    x = scale[_places(strata, taken)]
+    known = strata.known[strata.order]
+    ran = _places(strata, taken)
+    factors, freedom = _factors(sample, known[ran], values)
+    predicted = known @ factors
+    residual = values - predicted[ran]
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
-    some = np.maximum(taken, 1)
-    sums = _reduce(x, starts, taken)
-    mean_all = strata._sums(scale) / np.maximum(strata.units, 1)  # noqa: SLF001 - the same module
-    ratio = _reduce(values, starts, taken) / np.where(sums > 0, sums, 1.0)[:, None]
-    residual = values - np.repeat(ratio, taken, axis=0) * x[:, None]
-    squares = _reduce(residual**2, starts, taken)
-    lift = np.where(sums > 0, mean_all * some / np.where(sums > 0, sums, 1.0), 1.0)
-    spread = squares / np.maximum(taken - 1, 1)[:, None] * (lift**2)[:, None]
-    weight = strata.units * (strata.units - taken) / some
-    return _Fit(ratio, spread, weight, taken)
+    some = np.maximum(taken, 1)[:, None]
+    mean = _reduce(residual, starts, taken) / some
+    squares = _reduce((residual - np.repeat(mean, taken, axis=0)) ** 2, starts, taken)
+    spread = squares / np.maximum(taken - 1, 1)[:, None] * freedom
+    weight = strata.units * (strata.units - taken) / some[:, 0]
+    return _Fit(predicted, residual, mean, spread, weight, taken)
+
+
+def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, float]:
+    """Least squares of rows on what is known, without the certainty stratum; and what the fit takes from the spread."""
+    taken, first = sample.taken, int(sample.taken[0])
+    n, p = len(values) - first, known.shape[1]
+    if n < ENOUGH * p:
+        return np.zeros((p, values.shape[1])), 1.0
+    weight = np.sqrt(
+        np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
+    )
+    factors = np.linalg.lstsq(known[first:] * weight[:, None], values[first:] * weight[:, None], rcond=None)[0]
+    return factors.astype(np.float64), n / (n - p)
 
 
 def _reduce(values: Floats, starts: Integers, taken: Integers) -> Floats:
@@ -224,10 +238,12 @@ def totals(sample: Sample, values: Floats) -> Totals:
         Of each unit that ran, in the order of ``sample.rows``.
     """
     fit = _fit(sample, values)
-    value = (fit.ratio * sample.strata._sums(sample.strata.scale)[:, None]).sum(axis=0)  # noqa: SLF001
-    part = fit.weight[:, None] * fit.spread
+    units, first = sample.strata.units, int(sample.taken[0])
+    rest = fit.predicted[first:].sum(axis=0) + (units[1:, None] * fit.mean[1:]).sum(axis=0)
+    value = values[:first].sum(axis=0) + rest
+    part = fit.weight[:, None] * _smoothed(sample, fit)
     variance = part.sum(axis=0)
-    below = (part**2 / np.maximum(fit.taken - 1, 1)[:, None]).sum(axis=0)
+    below = (part**2 / np.maximum(fit.taken - 1 + PRIOR, 1)[:, None]).sum(axis=0)
     freedom = np.where(below > 0, variance**2 / np.where(below > 0, below, 1.0), np.inf)
     return Totals(value, variance, freedom)
 
@@ -243,6 +259,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
     relative = np.where(found.value != 0, 1 / np.where(found.value != 0, found.value, 1.0), 0.0)
     unlike = np.sqrt(_smoothed(sample, fit) * relative**2)  # by stratum and quantity
     wish = N * unlike.max(axis=1)
+    wish[wish < 1e-9 * wish.max(initial=0.0)] = 0.0  # rounding of units that are alike
     goal = (error / t_quantile(found.freedom)) ** 2
     low, high = 0.0, float((N[wish > 0] / wish[wish > 0]).max(initial=0.0))
     for _ in range(60):  # the smallest sample by bisection of its scale
@@ -255,29 +272,33 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
 
 
 def _smoothed(sample: Sample, fit: _Fit) -> Floats:
-    """Residual variances, those of small samples drawn towards what is usual for the size of their stratum."""
+    """Residual variances, small samples' drawn towards what is usual: in proportion to size, or not, if less."""
     strata = sample.strata
-    mean = strata._sums(strata.scale) / np.maximum(strata.units, 1)  # noqa: SLF001 - the same module
+    size = strata.sums(strata.known[strata.order, 1])
+    square = ((size / np.maximum(strata.units, 1) + 0.1) ** 2)[:, None]
     freedom = np.where(sample.taken < strata.units, np.maximum(sample.taken - 1, 0), 0)[:, None]
-    scaled = fit.spread / np.maximum(mean**2, 1e-300)[:, None]
-    usual = (freedom * scaled).sum(axis=0) / max(freedom.sum(), 1)
-    prior = 4.0
-    smoothed: Floats = (freedom * scaled + prior * usual) / (freedom + prior) * (mean**2)[:, None]
+    share = freedom / max(freedom.sum(), 1)
+    usual = np.minimum((share * fit.spread / square).sum(axis=0) * square, (share * fit.spread).sum(axis=0))
+    prior = np.where(size > 0, PRIOR, 0.0)[:, None]  # units without size are alike
+    smoothed: Floats = (freedom * fit.spread + prior * usual) / np.maximum(freedom + prior, 1)
     return smoothed
 
 
 def expanded(sample: Sample) -> Integers:
-    """Rows of all units, (units, events): as executed, and by the ratios of their stratum where they were not.
-
-    Rounded so that totals are the estimates; the rows of the certainty stratum are exact.
-    """
+    """Rows of all units, (units, events): as executed, or as foretold, so that totals are the estimates."""
     strata, taken = sample.strata, sample.taken
+    values = sample.rows.astype(np.float64)
+    fit = _fit(sample, values)
     ran = np.zeros(len(strata.order), np.bool_)
     ran[_places(strata, taken)] = True
-    table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
-    table[drawn(strata, taken)] = sample.rows
-    stratum = np.repeat(np.arange(len(taken)), strata.units)[~ran]
-    rows = _fit(sample, sample.rows.astype(np.float64)).ratio[stratum] * strata.scale[~ran][:, None]
+    table = np.zeros((len(strata.order), values.shape[1]), np.int64)
+    table[drawn(strata, taken)] = np.rint(sample.rows)
+    if ran.all():
+        return table
+    rows = fit.predicted[~ran] + np.repeat(fit.mean, strata.units - taken, axis=0)
+    np.maximum(rows, 0.0, out=rows)
+    sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
+    rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
     ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
     table[strata.order[~ran]] = np.diff(ends, axis=0, prepend=0)
     return table

@@ -1,6 +1,7 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
+from functools import partial
 from typing import Any
 
 from models.errors import TilestampError
@@ -73,19 +74,23 @@ def simulate(
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    sampler = Sampler(error, seed, pipeline, machine) if error and takes(pipeline, "sample") else None
-    internal = ({"sample": sampler} if sampler else {}) | ({"picture": False} if _no_picture(pipeline, picture) else {})
-    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, **options, **internal)
-    note, sampled = scene.note, {}
-    if sampler and sampler.executed:
-        sampled = {"units": sampler.executed, "seconds_saved": sampler.seconds_saved}
-    elif error:
-        note = "; ".join(filter(None, [note, f"nothing was sampled: {pipeline} with these options runs in full"]))
-    return Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, note, error, sampled)
+    run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, options)
+    draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, **options)
+    note = scene.note
+    if error and takes(pipeline, "sample"):
+        sampler = Sampler(error, seed, pipeline, machine)
+        frame = draw(sample=sampler)
+        sampled = run(frame, note, error, {"units": sampler.executed, "seconds_saved": sampler.seconds_saved})
+        if sampler.executed and _close(sampled):
+            return sampled
+    if error:
+        note = "; ".join(filter(None, [note, f"everything ran: {pipeline} here cannot be sampled within {error:g}"]))
+    return run(draw(**{} if picture or not takes(pipeline, "picture") else {"picture": False}), note, error)
 
 
-def _no_picture(pipeline: str, picture: bool) -> bool:
-    return not picture and takes(pipeline, "picture")
+def _close(run: Run) -> bool:
+    """Whether a sample tells the frame's time within the error: where the tail decides, only all units do."""
+    return run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error
 
 
 def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:

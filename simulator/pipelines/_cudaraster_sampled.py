@@ -10,7 +10,8 @@ from models.simt import Simt
 from simulator.sampler import Sampler
 from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
-from simulator.stages.laine2011.fine_raster import MODES, fine_raster, fine_streams
+from simulator.stages.laine2011.fine_raster import MODES, WARP_LINES, WARPS, count_starts, fine_raster, fine_streams
+from simulator.stages.laine2011.sampled_tiles import tile_areas
 from simulator.stages.laine2011.triangle_setup import triangle_setup
 from simulator.work import Work
 
@@ -47,12 +48,21 @@ def sampled_draw(
     )  # fmt: skip
     queues, bin_work, _ = bins.bin_raster(setup, **shape)
     lists, tile_work, _ = tiles.coarse_raster(queues, setup, deferred_clear=True, **shape)
+    area = tile_areas(setup, lists, width, height)
     fine_work = sample.stage(
         np.diff(lists.starts)[lists.active],
         lambda units: fine_raster(
             setup, lists.starts, lists.entries, lists.active[units], **shape, samples=samples, mode=mode,
+            starts=False,
         )[1],
-        lambda table: fine_streams(table, setup, len(lists.entries), width, height, samples),
+        lambda table: fine_streams(_started(table, simt), setup, len(lists.entries), width, height, samples),
+        (area[lists.active],),
     )  # fmt: skip
     variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
     return [replace(setup_work, variant=mode), bin_work, tile_work, replace(fine_work, variant=variant)]
+
+
+def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:
+    """Add to the rows of all tiles what the warps do besides; in place."""
+    count_starts(table, WARPS * simt.sms, 128 if simt.coalescing == WARP_LINES else 32)
+    return table

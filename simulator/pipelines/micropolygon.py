@@ -5,7 +5,6 @@ screen tiles by count, scan and write; rasterize each tile. In the hybrid the gr
 instead of the buckets.
 """
 
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from models.errors import TilestampError
 from models.simt import Simt
 from simulator.frame import Frame
 from simulator.pipelines._micropolygon_hybrid import draw_grids
+from simulator.pipelines._micropolygon_sampled import sampled_back_end
 from simulator.sampler import Sampler
 from simulator.scenes.scene import Scene
 from simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
@@ -23,8 +23,8 @@ from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from simulator.stages.eisenacher2010.bucket_write import bucket_write
 from simulator.stages.eisenacher2010.dice import dice
 from simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import raster_streams, tile_raster
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
+from simulator.stages.eisenacher2010.tile_raster import tile_raster
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 from simulator.work import Work
 
 
@@ -94,17 +94,24 @@ def micropolygon(
         raise TilestampError(f"texture must be an array of (H, W, 3 or 4) bytes, not {texture!r}")
     points = scene.patches.points
     tiles = screen_tiles(width, height, tile, bound)
+    boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid else None
     subpatches, split = bound_and_split(
-        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting
+        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, wanted=boxes
     )
+    if sample and boxes and len(subpatches.patch):
+        options = {"spp": spp, "box_tests": box_tests, "edges": edges}
+        view = matrix, width, height, simt
+        rest = sampled_back_end(
+            sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=options
+        )
+        return Frame.numbers([*split, *rest], _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS)))
     grids, diced = dice(points, subpatches, matrix, width, height, simt, texture=texture, counting=counting)
     if hybrid:
         return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
     start, scanned = bucket_scan(count, simt, counting=counting)
     lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
-    raster = partial(
-        tile_raster,
+    image, depth, overdraw, drawn = tile_raster(
         grids.vertices,
         count,
         start,
@@ -118,16 +125,6 @@ def micropolygon(
         edges=edges,
         counting=counting,
     )
-    if sample is not None:
-        shape = block_shape(tile, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
-        sampled = sample.stage(
-            count,
-            lambda blocks: raster(only=blocks)[3][0],
-            lambda table: raster_streams(table, lists, shape, simt, len(grids.vertices)),
-        )
-        works = [*split, *diced, *counted, *scanned, *written, sampled]
-        return Frame.numbers(works, _facts(subpatches, len(lists)))
-    image, depth, overdraw, drawn = raster()
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
     return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, len(lists)))

@@ -33,6 +33,7 @@ from simulator.work import Work
 BLOCK = 256  # threads, a sub-patch each
 GRID_SIDE = 4  # control points
 MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 bits
+BOX = 5  # numbers: x0, y0, x1, y1, area
 MAX_QUEUE = 2**24  # sub-patches
 
 BoundRule = Literal["control_points", "pixel_extent"]
@@ -54,7 +55,9 @@ class SubPatches(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _subdivide(part: Any, parts: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
+def _subdivide(
+    part: Any, parts: Any, queue: Any, path: Any, boxes: Any, places: Any, target: Any, target_path: Any, moved: Any
+) -> Any:
     """Move what is kept, and write the four children of what is split, u first: one part of the queue."""
     for k in range(part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts):
         place = places[k]
@@ -63,6 +66,8 @@ def _subdivide(part: Any, parts: Any, queue: Any, path: Any, places: Any, target
             target.level[place] = queue.level[k]
             target.i[place], target.j[place] = queue.i[k], queue.j[k]
             target_path[place] = KEEP
+            if moved.shape[0] > 0:
+                moved[place] = boxes[k]
         elif path[k] >= ACROSS:
             for child in range(4):
                 target.patch[place + child] = queue.patch[k]
@@ -85,6 +90,7 @@ def bound_and_split(
     near: float = 0.0,
     min_depth: int = 0,
     max_depth: int = MAX_DEPTH,
+    wanted: list[NDArray[np.float32]] | None = None,
 ) -> tuple[SubPatches, list[Work]]:
     """Subdivide patches until their sub-patches are small on screen.
 
@@ -110,6 +116,8 @@ def bound_and_split(
     max_depth : int
         Halvings after which a sub-patch that is still large, or across the eye plane, is given up: it is dropped and
         counted in ``SubPatches.passes``.
+    wanted : list, optional
+        Is given (N, 5) float32: box x0, y0, x1, y1 in pixels of each sub-patch's control points, and its area.
 
     Returns
     -------
@@ -126,14 +134,16 @@ def bound_and_split(
     screen = screen_points(points, matrix, width, height)
     size, limit = np.array([width, height, near], np.float32), np.float32(bound)
     queue, path = _first_queue(len(points))
+    boxes = np.empty((0 if wanted is None else len(points), BOX), np.float32)
     works = [transform_work(len(points), simt)] if counting else []
     passes = []
     while True:
         whole_pixels = bound_rule == "pixel_extent"
         parts = parts_of(len(path), BLOCK)
         for_parts(
-            examine, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels, min_depth, max_depth
-        )
+            examine, parts, GRID_SIDE, LANES, screen, queue, path, boxes, size, limit, whole_pixels,
+            min_depth, max_depth,
+        )  # fmt: skip
         slots = _SLOTS[path]
         places, scan = bucket_scan(slots, simt, counting=counting)
         culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
@@ -144,9 +154,11 @@ def bound_and_split(
             break
         if counting:
             works.append(subdivide_work(path, places, simt))
-        queue, path = _next_queue(queue, path, places, int(slots.sum()), bound)
+        queue, path, boxes = _next_queue(queue, path, boxes, places, int(slots.sum()), bound)
         if across + split == 0:
             break
+    if wanted is not None:
+        wanted.append(boxes)
     return SubPatches(*queue[:4], np.array(passes, np.int64)), works
 
 
@@ -171,8 +183,13 @@ def _empty_queue(length: int) -> tuple[SubPatches, NDArray[np.uint8]]:
 
 
 def _next_queue(
-    queue: SubPatches, path: NDArray[np.uint8], places: NDArray[np.uint32], length: int, bound: float
-) -> tuple[SubPatches, NDArray[np.uint8]]:
+    queue: SubPatches,
+    path: NDArray[np.uint8],
+    boxes: NDArray[np.float32],
+    places: NDArray[np.uint32],
+    length: int,
+    bound: float,
+) -> tuple[SubPatches, NDArray[np.uint8], NDArray[np.float32]]:
     """Fill the other buffer."""
     if length > MAX_QUEUE:
         raise TilestampError(
@@ -180,8 +197,10 @@ def _next_queue(
             "take a larger bound, a smaller image or a camera further away"
         )
     target, target_path = _empty_queue(length)
-    for_parts(_subdivide, parts_of(len(path), BLOCK), queue, path, places, target, target_path)
-    return target, target_path
+    moved = np.empty((length if len(boxes) else 0, BOX), np.float32)
+    parts = parts_of(len(path), BLOCK)
+    for_parts(_subdivide, parts, queue, path, boxes, places, target, target_path, moved)
+    return target, target_path, moved
 
 
 def _check(

@@ -220,13 +220,13 @@ def bucket_count(
         count,
         idx,
         [
-            _init_work(tiles, padding, simt),
-            _address_work(boxes, tiles, table, requests.sum(axis=0), aggregate=aggregate),
+            init_work(tiles, padding, simt),
+            address_work(len(boxes), tiles, table, requests.sum(axis=0), aggregate=aggregate),
         ],
     )
 
 
-def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
+def init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     """Work of setting COUNT to zero."""
     words = tiles.total * padding
     sizes = np.full(-(-words // BLOCK), BLOCK)
@@ -242,19 +242,19 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))
 
 
-def _address_work(
-    boxes: NDArray[np.float32],
+def address_work(
+    patches: int,
     tiles: Tiles,
     table: NDArray[np.int64],
     requests: NDArray[np.int64],
     *,
     aggregate: bool,
 ) -> Work:
-    """Work of the address calculation."""
+    """Work of the address calculation, from the rows of its blocks and the atomic requests by chunk."""
     total = table.sum(axis=0)
     streams = (
-        Stream("boxes", "load", int(total[_E.LOAD_BYTES]), boxes.nbytes),
-        Stream("IDX", "store", int(total[_E.STORE_BYTES]), len(boxes) * tiles.slots**2 * WORD_BYTES),
+        Stream("boxes", "load", int(total[_E.LOAD_BYTES]), patches * BOX_BYTES),
+        Stream("IDX", "store", int(total[_E.STORE_BYTES]), patches * tiles.slots**2 * WORD_BYTES),
         Stream(
             "COUNT",
             "atomic",

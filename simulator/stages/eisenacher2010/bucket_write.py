@@ -13,7 +13,7 @@ from models.coalescing import transactions
 from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
-from simulator.stages.eisenacher2010.bucket_count import BLOCK, WORD_BYTES, active_lanes, patch_traffic
+from simulator.stages.eisenacher2010.bucket_count import BLOCK, BOX_BYTES, WORD_BYTES, active_lanes, patch_traffic
 from simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
 from simulator.work import Work
 
@@ -139,14 +139,21 @@ def bucket_write(
     table = np.zeros((-(-len(boxes) // BLOCK), len(_E)), np.int64)
     parts = parts_of(len(table))
     for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
-    total = table.sum(axis=0)
-    own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])
-    streams = (
-        Stream("boxes", "load", int(total[_E.BOX_BYTES]), boxes.nbytes),
-        Stream("IDX", "load", int(total[_E.IDX_BYTES]), len(boxes) * tiles.slots**2 * WORD_BYTES),
-        Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
-        Stream("LISTS", "store", int(total[_E.STORE_BYTES]), lists.nbytes),
-    )
+    streams = write_streams(table, len(boxes), tiles, count)
     return lists, [
         Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)
     ]
+
+
+def write_streams(
+    table: NDArray[np.int64], patches: int, tiles: Tiles, count: NDArray[np.uint32]
+) -> tuple[Stream, ...]:
+    """Buffers that the kernel touches, from the rows of its blocks."""
+    total = table.sum(axis=0)
+    own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])
+    return (
+        Stream("boxes", "load", int(total[_E.BOX_BYTES]), patches * BOX_BYTES),
+        Stream("IDX", "load", int(total[_E.IDX_BYTES]), patches * tiles.slots**2 * WORD_BYTES),
+        Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
+        Stream("LISTS", "store", int(total[_E.STORE_BYTES]), int(count.sum(dtype=np.int64)) * WORD_BYTES),
+    )

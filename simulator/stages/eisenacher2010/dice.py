@@ -137,6 +137,7 @@ def _dice(
     screen: Any,
     light: Any,
     texture: Any,
+    shaded: Any,
     vertices: Any,
     colors: Any,
     boxes: Any,
@@ -155,13 +156,15 @@ def _dice(
         gather(screen, squares.patch, corners)
         restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
         _project(grid.rows)
-        gather(nets, squares.patch, net)
-        evaluate(
-            net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u, grid.along_v
-        )
-        if set_normals(grid.rows):
-            _borrow_normals(grid, net, squares, lanes)
-        shade(grid, light, texture, squares)
+        if shaded:
+            gather(nets, squares.patch, net)
+            evaluate(
+                net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u,
+                grid.along_v,
+            )  # fmt: skip
+            if set_normals(grid.rows):
+                _borrow_normals(grid, net, squares, lanes)
+            shade(grid, light, texture, squares)
         _store_grids(grid, first, lanes, vertices, colors, boxes)
 
 
@@ -175,6 +178,7 @@ def dice(
     *,
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
+    shaded: bool = True,
 ) -> tuple[Grids, list[Work]]:
     """Evaluate and shade a 4x4 grid for each sub-patch.
 
@@ -192,6 +196,8 @@ def dice(
         Laid over each urPatch, u to the right and v down; a solid checker if not given.
     counting : bool
         Without it no works come back.
+    shaded : bool
+        Without it vertices have no colour: where no picture is wanted.
 
     Returns
     -------
@@ -226,14 +232,15 @@ def dice(
         screen,
         light,
         texture,
+        shaded,
         vertices,
         colors,
         grids.boxes,
     )
-    return grids, [_dice_work(number, len(points), texture is not None, simt)] if counting else []
+    return grids, [dice_work(number, len(points), texture is not None, simt)] if counting else []
 
 
-def _dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
+def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
     """Work of dicing: nothing depends on the data, but that the last block may be partly empty."""
     per_block = BLOCK // VERTICES
     grids = np.minimum(per_block, number - per_block * np.arange(-(-number // per_block)))

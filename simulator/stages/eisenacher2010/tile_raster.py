@@ -183,7 +183,11 @@ def tile_raster(
     buffers = (image, depth, overdraw, table)
     parts = parts_of(len(blocks), _PART_TILES)
     for_parts(_raster_tiles, parts, blocks, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
-    works = [] if table is None else [_work(shape, table, raster_streams(table, lists, shape, simt, len(vertices)))]
+    if table is None:
+        return image, depth, overdraw, []
+    seen = np.zeros(len(vertices), np.bool_)
+    seen[lists] = True
+    works = [_work(shape, table, raster_streams(table, len(lists), int(np.count_nonzero(seen)), shape, simt))]
     return image, depth, overdraw, works
 
 
@@ -196,19 +200,16 @@ def shared_bytes(shape: BlockShape) -> int:
 
 
 def raster_streams(
-    table: NDArray[np.int64], lists: NDArray[np.uint32], shape: BlockShape, simt: Simt, grids: int
+    table: NDArray[np.int64], entries: int, drawn: int, shape: BlockShape, simt: Simt
 ) -> tuple[Stream, ...]:
-    """Buffers that the kernel touches, by the rows of all tiles, their lists, and the number of grids."""
+    """Buffers that the kernel touches, by the rows of all tiles, the entries of their lists, and the grids in any."""
     total = table.sum(axis=0)
-    seen = np.zeros(grids, np.bool_)
-    seen[lists] = True
-    drawn = int(np.count_nonzero(seen))
     vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
     edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
     streams = [
         Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES),
-        Stream("LISTS", "load", rest, lists.nbytes + 2 * len(table) * WORD_BYTES),
+        Stream("LISTS", "load", rest, entries * WORD_BYTES + 2 * len(table) * WORD_BYTES),
         Stream("framebuffer", "store", int(total[_E.STORE_BYTES]), int(total[_E.STORE_BYTES])),
     ]
     if shape.loaded:

@@ -1,0 +1,201 @@
+"""Sampling: intervals hold the full run's numbers, samples are exact parts of it, and everything is a pure function."""
+
+import numpy as np
+import pytest
+
+from models.errors import TilestampError
+from simulator import simulate
+from simulator.sampling import Sample, drawn, enlarged, expanded, make_strata, pilot, t_quantile, totals
+from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from simulator.work import Work
+
+SEEDS = 200
+ERROR = 0.02
+MICRO = {"width": 320, "height": 240, "bound": 3}
+
+
+def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes and rows of units as unlike as those of a stage: (units,) and (units, 3)."""
+    random = np.random.default_rng(len(kind))
+    if kind == "even":
+        size = random.poisson(40, units)
+    elif kind == "skewed":
+        size = random.lognormal(3, 1, units).astype(int)
+    elif kind == "mostly empty":
+        size = random.poisson(30, units) * (random.random(units) < 0.3)
+    elif kind == "two kinds":
+        size = np.where(random.random(units) < 0.1, random.poisson(300, units), random.poisson(10, units))
+    else:  # short lists
+        size = random.poisson(2, units)
+    hits = random.binomial(64 * size, 0.2)
+    tests = 4 * size + random.poisson(3 * size)
+    return size, np.stack([10 + 64 * size + tests, tests, hits], axis=1).astype(np.int64)
+
+
+def run_sample(size: np.ndarray, table: np.ndarray, seed: int, error: float) -> Sample:
+    """What a sampler does, on a stage whose rows are known."""
+    strata = make_strata(size, [seed])
+    taken = pilot(strata)
+    for _ in range(5):
+        sample = Sample(strata, taken, table[drawn(strata, taken)])
+        found = totals(sample, sample.rows.astype(float))
+        if (found.half_width <= error * found.value).all():
+            break
+        taken = enlarged(sample, sample.rows.astype(float), error)
+    return Sample(strata, taken, table[drawn(strata, taken)])
+
+
+@pytest.mark.parametrize("kind", ["even", "skewed", "mostly empty", "two kinds", "short lists"])
+def test_intervals_hold_the_total_of_known_populations_in_19_of_20_samples(kind):
+    size, table = population(kind)
+    held = []
+    for seed in range(SEEDS):
+        sample = run_sample(size, table, seed, ERROR)
+        found = totals(sample, sample.rows.astype(float))
+        held += (np.abs(found.value - table.sum(axis=0)) <= found.half_width + 1e-6).tolist()
+    assert 0.925 <= np.mean(held) <= 0.985  # of 600 intervals, not all independent
+
+
+@pytest.fixture(scope="module")
+def stages() -> dict[str, tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]]:
+    """Full work tables of five scenes: rows, sizes, and further things known."""
+    scenes = [
+        ("micropolygon", "teapot", "gtx280", {"width": 400, "height": 300, "bound": 3}),
+        ("micropolygon", "spot", "gtx280", {"width": 400, "height": 300, "bound": 3}),
+        ("micropolygon", "teapot", "gtx280", {"width": 400, "height": 300, "tile": 16, "spp": 4}),
+        ("cudaraster", "teapot", "gtx480", {"width": 640, "height": 480}),
+        ("cudaraster", "spot", "gtx480", {"width": 640, "height": 480}),
+    ]
+    found = {}
+    for pipeline, scene, machine, options in scenes:
+        full = simulate(scene, pipeline, machine, fidelity="counts", **options)
+        kind = TileRasterEvent if pipeline == "micropolygon" else FineRasterEvent
+        work = full.frame.works[-1]
+        assert isinstance(work, Work)
+        size = work.table[:, kind.GRIDS if kind is TileRasterEvent else kind.ENTRY_LANES]
+        found[f"{pipeline} {scene} {options}"] = (
+            work.table[:, [kind.SAMPLE_TESTS, kind.SAMPLE_HITS, kind.LOAD_BYTES]],
+            size,
+        )
+    return found
+
+
+def test_93_to_97_of_100_intervals_hold_the_full_run_over_200_seeds_and_five_scenes(stages):
+    held, wide = [], 0
+    for table, size in stages.values():
+        for seed in range(SEEDS):
+            sample = run_sample(size, table, seed, 0.1)
+            found = totals(sample, sample.rows.astype(float))
+            sampled = found.half_width > 1e-9 * found.value  # what all ran for has no interval to miss
+            held += (np.abs(found.value - table.sum(axis=0)) <= found.half_width)[sampled].tolist()
+            wide += int(sampled.sum())
+    assert wide > 5 * SEEDS
+    assert 0.93 <= np.mean(held) <= 0.97
+
+
+def test_a_sample_of_everything_has_no_width_and_is_exact():
+    size, table = population("skewed")
+    strata = make_strata(size, [0])
+    sample = Sample(strata, strata.units, table[drawn(strata, strata.units)])
+    found = totals(sample, sample.rows.astype(float))
+    assert found.value == pytest.approx(table.sum(axis=0))
+    assert not found.half_width.any()
+    assert (expanded(sample) == table).all()
+
+
+def test_the_table_of_all_units_adds_up_to_the_estimates():
+    size, table = population("two kinds")
+    sample = run_sample(size, table, 1, ERROR)
+    wide = expanded(sample)
+    assert wide.sum(axis=0) == pytest.approx(totals(sample, sample.rows.astype(float)).value, rel=1e-4)
+    assert (wide[drawn(sample.strata, sample.taken)] == sample.rows).all()
+
+
+def test_a_larger_sample_holds_the_smaller_one():
+    size, table = population("even")
+    strata = make_strata(size, [3])
+    small = pilot(strata)
+    sample = Sample(strata, small, table[drawn(strata, small)])
+    more = enlarged(sample, sample.rows.astype(float), 0.001)
+    assert set(drawn(strata, small)) < set(drawn(strata, more))
+
+
+def test_quantiles_of_t_are_those_of_the_tables():
+    assert t_quantile(np.array([1, 4, 5, 10, 30, 1e9])) == pytest.approx(
+        [12.706, 2.776, 2.571, 2.228, 2.042, 1.960], abs=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("pipeline", "machine", "options"),
+    [("micropolygon", "gtx280", MICRO), ("cudaraster", "gtx480", {"width": 320, "height": 240})],
+)
+def test_sampled_blocks_do_exactly_what_they_do_in_the_full_run(pipeline, machine, options):
+    full = simulate("teapot", pipeline, machine, fidelity="counts", **options)
+    part = simulate("teapot", pipeline, machine, fidelity="counts", error=0.3, **options)
+    work, whole = part.frame.works[-1], full.frame.works[-1]
+    assert isinstance(work, Work)
+    assert isinstance(whole, Work)
+    assert work.sample is not None
+    ran = drawn(work.sample.strata, work.sample.taken)
+    assert len(ran) < len(whole.table)
+    moved = [
+        e for e in whole.events if e.name.startswith(("LOAD_", "ATOMIC", "WARP_STARTS"))
+    ]  # where lists lie; starts
+    same = [e for e in whole.events if e not in moved]
+    assert (work.sample.rows[:, same] == whole.table[ran][:, same]).all()
+
+
+def test_every_number_of_a_sampled_run_has_its_interval():
+    run = simulate("teapot", "micropolygon", "gtx280", error=0.3, **MICRO)
+    assert run.sampled
+    assert set(run.counts_interval) == set(run.counts)
+    for name, estimate in run.counts_interval.items():
+        assert estimate.low <= run.counts[name] <= estimate.high, name
+    assert {"milliseconds_low", "milliseconds_high", "instructions_low", "sample_hits_high"} <= set(run.stages)
+    low, high = run.milliseconds_interval[1:]
+    assert 0 < low < run.milliseconds < high
+
+
+def test_without_an_error_nothing_is_sampled_and_no_column_is_added():
+    run = simulate("teapot", "micropolygon", "gtx280", **MICRO)
+    assert not run.sampled
+    assert not [name for name in run.stages if name.endswith("_low")]
+    assert run.milliseconds_interval.half_width == 0
+
+
+def test_a_sampled_run_says_that_it_has_no_picture():
+    run = simulate("teapot", "micropolygon", "gtx280", error=0.3, fidelity="counts", **MICRO)
+    with pytest.raises(TilestampError, match="a sampled run draws no picture; ask with error=0"):
+        _ = run.image
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_seed_others():
+    first, again, other = (
+        simulate(
+            "teapot", "cudaraster", "gtx480", width=640, height=480, fidelity="counts", error=0.1, seed=seed
+        ).counts
+        for seed in (1, 1, 2)
+    )
+    assert first == again
+    assert first != other
+
+
+def test_a_pipeline_that_cannot_be_sampled_runs_in_full_and_says_so():
+    run = simulate("teapot", "hardware", "gtx280", width=64, height=48, error=0.1)
+    assert not run.sampled
+    assert "everything ran" in run.note
+    assert run.milliseconds_interval.half_width == 0
+
+
+def test_where_the_tail_decides_and_a_sample_cannot_tell_everything_runs():
+    options = {"width": 320, "height": 240}
+    run = simulate("teapot", "micropolygon", "gtx280", error=0.001, **options)
+    assert run.milliseconds == simulate("teapot", "micropolygon", "gtx280", **options).milliseconds
+
+
+@pytest.mark.parametrize("error", [-0.1, 1.0, float("nan")])
+def test_an_error_that_is_no_share_is_refused(error):
+    with pytest.raises(TilestampError, match="error is a share of the value"):
+        simulate("teapot", error=error)
