@@ -14,10 +14,15 @@ from simulator.mix import load_mix
 from simulator.pipelines.binned import binned
 from simulator.scenes.camera import LookAt
 from simulator.scenes.scene import Mesh, Scene
+from simulator.scenes.textured_mesh import geometry
 from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.stages.zhang2025.depth import DEPTH_STEPS
 from simulator.stages.zhang2025.fine_tile import quad_mask
-from simulator.stages.zhang2025.primitive_compaction import most_triangles
+from simulator.stages.zhang2025.pixel_shader_block import quad_coordinates
+from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
+from simulator.stages.zhang2025.primitive_compaction import most_triangles, primitive_compaction
+from simulator.stages.zhang2025.triangle_setup import triangle_setup
+from simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 from tests import naive_textured as naive
 from tests.textured_soup import soup
 
@@ -244,3 +249,24 @@ def test_stores_that_scatter_leave_an_sm_at_their_own_rate():
     launch = load_mix("binned", "8.6").launch(setup, 32)
     gathered = altered(machine, {"memory.l1_write_bytes_per_clock": 0.0}, "assumed", "a test")
     assert price([launch], machine)[0].cycles > 2.0 * price([launch], gathered)[0].cycles
+
+
+def test_coordinates_of_a_quad_are_perspective_correct_within_1e_5(scene, matrix):
+    """Planes of 1/w and of coordinates over w, against the division at each pixel in double precision."""
+    mesh = geometry(scene)
+    vertices, _ = vertex_fetch_and_shading(mesh, matrix, SIMT)
+    slots, _ = primitive_assembly(mesh, vertices, WIDTH, HEIGHT, SIMT)
+    primitives, _ = primitive_compaction(slots, len(mesh.triangles), SIMT)
+    data, _ = triangle_setup(primitives, SIMT)
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT) * (1, -1, 1, 1) + (0, HEIGHT, 0, 0)
+    uv = np.zeros((4, 2), np.float32)
+    whole = np.flatnonzero(np.bincount(data.ids, minlength=len(mesh.triangles)) == 1)  # not clipped
+    assert len(whole) > 10
+    for p in np.flatnonzero(np.isin(data.ids, whole)):
+        t = mesh.triangles[data.ids[p]]
+        x, y = (int(v) // 2 * 2 for v in screen[t][:, :2].mean(axis=0))
+        quad_coordinates(data.planes[p], np.array([x, y], np.int32), uv)
+        area = np.linalg.det(np.concatenate([screen[t][:, :2], np.ones((3, 1))], axis=1))
+        for k in range(4):
+            exact = naive.perspective(screen[t], mesh.uvs[t], x + k % 2 + 0.5, y + k // 2 + 0.5)
+            assert uv[k] == pytest.approx(exact, abs=1e-5 * max(1.0, 1000.0 / abs(area)))

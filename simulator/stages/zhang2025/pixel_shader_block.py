@@ -49,7 +49,7 @@ class PixelShaderEvent(IntEnum):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _coordinates(planes: Any, place: Any, uv: Any) -> None:
+def quad_coordinates(planes: Any, place: Any, uv: Any) -> None:
     """Perspective-correct texture coordinates of a quad's four pixels, (4, 2)."""
     for k in range(4):
         x, y = np.float32(place[0] + k % 2) + _HALF, np.float32(place[1] + k // 2) + _HALF
@@ -74,7 +74,7 @@ def _shade_quad(
     """Colours of a quad; returns its level of detail."""
     lod = _ZERO
     if texture >= 0:
-        _coordinates(planes, place, uv)
+        quad_coordinates(planes, place, uv)
         if method == TRILINEAR:
             lod = level_of_detail(
                 chains, texture, uv[1, 0] - uv[0, 0], uv[1, 1] - uv[0, 1], uv[2, 0] - uv[0, 0], uv[2, 1] - uv[0, 1]
