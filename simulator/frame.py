@@ -28,6 +28,8 @@ class Frame:
         Heat maps by counter, a cell a tile or a pixel.
     facts : dict
         What a report may say besides: queue lengths, memory, retries, what was given up.
+    warnings : tuple of str
+        Sentences on what the picture lacks or shows wrong.
     """
 
     image: NDArray[np.uint8]
@@ -36,6 +38,7 @@ class Frame:
     triangle_ids: NDArray[np.int32] | None = None
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @classmethod
     def numbers(cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any] | None = None) -> "Frame":

@@ -77,6 +77,16 @@ def test_few_blocks_hide_less():
     assert terms(units=12, CHAIN_LOAD=10)["latency"] == pytest.approx(ours)
 
 
+def test_words_that_meet_in_l2_within_a_span_that_fits_reach_dram_once():
+    size = 100 * H200.memory.l2_bytes
+    words = Stream("records", "store", 8 * size, size, span_bytes=H200.memory.l2_bytes // 2)
+    scattered = Stream("records", "store", 8 * size, size)
+    met, missed = (traffic([launch(streams=[s])], H200)[0] for s in (words, scattered))
+    assert met.dram_bytes == pytest.approx(size, rel=0.02)
+    assert missed.dram_bytes > 7 * size
+    assert met.l2_bytes == missed.l2_bytes == 8 * size
+
+
 def test_dram_moves_its_bytes_at_the_sustained_bandwidth():
     seconds = terms(streams=[stream("a", "load", 10**9)])["dram"] / GTX280.clock_hz
     assert seconds == pytest.approx(1 / (141.7 * GTX280.memory.dram_efficiency))

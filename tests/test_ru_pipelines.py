@@ -14,8 +14,10 @@ from simulator.pipelines.per_primitive import per_primitive
 from simulator.pipelines.tiled import tiled
 from simulator.scenes.camera import LookAt
 from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.textured_mesh import geometry
+from simulator.scenes.textured_mesh import draws, geometry
+from simulator.simulation import simulate
 from simulator.stages.ru2016.fragment_shading import interpolate
+from simulator.stages.ru2016.tile_lists import tile_lists
 from simulator.stages.ru2016.tile_lists_fill import overlaps
 from simulator.stages.ru2016.tiled_raster import Visible
 from simulator.stages.ru2016.vertex_shading import vertex_shading
@@ -100,6 +102,7 @@ def test_tiles_and_primitives_agree_without_the_race(scene, matrix):
 def test_a_tile_list_holds_every_triangle_that_covers_a_pixel_of_it(scene, matrix):
     frame = draw(scene, matrix, tile=8)
     lengths = frame.maps["list length"]
+    assert (frame.maps["tests"] == 64 * lengths).all()
     for y, x in np.argwhere(frame.triangle_ids >= 0):
         assert lengths[y // 8, x // 8] > 0
 
@@ -128,9 +131,72 @@ def test_the_originals_room_overflows_and_says_so():
     assert draw(scene, matrix, capacity="safe", cull_backfaces=False).facts["list entries lost by overflow"] == 0
 
 
+def test_what_is_lost_or_wrong_is_said(matrix):
+    far = LookAt((0, 0, 40), (0, 0, 0), fov_degrees=45).matrix(WIDTH, HEIGHT)
+    lossy = draw(soup(seed=1, count=110), far, capacity="original", cull_backfaces=False)
+    assert any("no room" in sentence for sentence in lossy.warnings)
+    assert any("not the nearest" in sentence for sentence in draw(soup(count=400), matrix, per_primitive).warnings)
+    assert draw(soup(count=1), matrix).warnings == ()
+
+
 def test_one_triangle_cannot_race(matrix):
     frame = draw(soup(count=1), matrix, per_primitive)
     assert frame.facts["pixels wrong by the race"] == 0
+
+
+def test_a_warp_walks_the_widest_box_of_each_row_of_tiles(matrix):
+    """Lanes of a warp meet after each row: two boxes of 1x4 and 4x1 tiles take 4 + 1 + 1 + 1 steps, not 4."""
+    corners = [(0, 0), (6, 0), (0, 30), (0, 0), (30, 0), (0, 6)]
+    screen = np.array([[x + 1, y + 1, 0.5, 1.0] for x, y in corners], np.float32)
+    lists = tile_lists(
+        screen, np.arange(6, dtype=np.int32).reshape(2, 3), np.arange(2, dtype=np.int32), WIDTH, HEIGHT, SIMT,
+        tile=8, culling=False, capacity="safe",
+    )  # fmt: skip
+    assert lists[1][-1].counts()["BOX_STEPS"] == 4 + 1 + 1 + 1
+
+
+def test_each_part_of_a_model_is_transformed_and_assembled_by_itself(scene, matrix):
+    parts = np.array([[60, 20], [30, 10], [30, 10]])
+    drawn = draw(Scene("parts", mesh=replace(scene.mesh, draws=parts)), matrix)
+    grids = [w.total(w.events.WARP_LANES) for w in drawn.works if w.stage == "primitive_assembly"]
+    assert grids == [60, 30, 30]
+    assert drawn.facts["launches that the host waits for"] == 2 * 3 + 3
+    assert (drawn.image == draw(scene, matrix).image).all()
+
+
+def test_triangles_that_are_not_finite_are_missing_from_their_part(scene):
+    points = scene.mesh.positions.copy()
+    points[0, 0] = np.nan
+    whole = Scene("parts", mesh=replace(scene.mesh, positions=points, draws=np.array([[60, 20], [60, 20]])))
+    assert draws(whole, geometry(whole)).tolist() == [[60, 19], [60, 20]]
+
+
+def test_the_longest_warp_of_a_tile_hits_as_often_as_all_where_it_is_alone(scene, matrix):
+    counts = work(draw(scene, matrix, tile=4), "tiled_raster").counts()
+    assert counts["LONGEST_HITS"] == counts["HIT_WARPS"]
+    assert counts["LONGEST_NEARER"] == counts["NEARER_WARPS"]
+
+
+def test_four_pixel_tiles_are_slower_than_eight_for_want_of_warps():
+    """Published: 33.3 and 27.2 ms. Both hold 16 lists on an SM; 4x4 has more of them."""
+    rng = np.random.default_rng(5)
+    dense = soup(count=1)
+    points = rng.uniform(-1.5, 1.5, (4000, 1, 3)) + rng.uniform(-0.08, 0.08, (4000, 3, 3))
+    positions = np.concatenate([points.reshape(-1, 3), np.ones((12000, 1))], axis=1).astype(np.float32)
+    mesh = Mesh(positions, np.arange(12000, dtype=np.int32).reshape(-1, 3))
+    times = [
+        simulate(replace(dense, mesh=mesh), "tiled", "gt750m", width=320, height=320, camera=CAMERA, tile=tile)
+        .stages.loc["tiled_raster"].milliseconds
+        for tile in (4, 8)
+    ]  # fmt: skip
+    assert times[0] > times[1]
+
+
+def test_a_texture_costs_the_shading_kernel_only_where_it_shows(scene, matrix):
+    plain = Scene("plain", mesh=replace(scene.mesh, texture_ids=None, textures=()))
+    shaded = [work(draw(s, matrix), "fragment_shading_bilinear") for s in (scene, plain)]
+    assert [w.total(w.events.TEXTURED_LANES) > 0 for w in shaded] == [True, False]
+    assert shaded[0].total(shaded[0].events.DRAWN_LANES) == shaded[1].total(shaded[1].events.DRAWN_LANES)
 
 
 def test_overlapping_triangles_race():
@@ -182,6 +248,11 @@ def test_occlusion_costs_the_same_on_every_scene(scene, matrix):
 def test_occlusion_refuses_a_parallel_projection(scene):
     with pytest.raises(TilestampError, match="perspective"):
         draw(scene, np.diag([0.3, 0.3, -0.1, 1.0]), ssao=True)
+
+
+def test_a_bad_filter_is_refused_per_primitive(scene, matrix):
+    with pytest.raises(TilestampError, match="texture_filter"):
+        draw(scene, matrix, per_primitive, texture_filter="cubic")
 
 
 @pytest.mark.parametrize("options", [{"tile": 3}, {"tile": 33}, {"capacity": "huge"}, {"texture_filter": "cubic"}])

@@ -39,6 +39,16 @@ def glb(tmp_path, change=None, binary=None):
     return path
 
 
+def _few_normals(tree):
+    tree["accessors"].append({"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 2})
+    tree["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 2
+
+
+def _short_colour(tree):
+    tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [1, 2]}}]
+    tree["meshes"][0]["primitives"][0]["material"] = 0
+
+
 def test_a_node_places_its_mesh(tmp_path):
     mesh = read_gltf(glb(tmp_path, lambda tree: tree["nodes"][0].update(translation=[1, 2, 3], scale=[2, 2, 2])))
     assert mesh.positions[:, :3].tolist() == [[1, 2, 3], [3, 2, 3], [1, 4, 3]]
@@ -59,7 +69,9 @@ def test_a_mesh_drawn_twice_is_there_twice(tmp_path):
         tree["nodes"].append({"mesh": 0})
         tree["scenes"][0]["nodes"] = [0, 1]
 
-    assert len(read_gltf(glb(tmp_path, change)).triangles) == 2
+    mesh = read_gltf(glb(tmp_path, change))
+    assert len(mesh.triangles) == 2
+    assert mesh.draws.tolist() == [[3, 1], [3, 1]]
 
 
 def test_a_mirror_turns_the_winding_back(tmp_path):
@@ -88,10 +100,16 @@ def test_missing_normals_are_made(tmp_path):
         (lambda t: t["asset"].update(version="1.0"), "only glTF 2.0"),
         (lambda t: t["accessors"][0].update(count=99), "accessor 0"),
         (lambda t: t["meshes"][0]["primitives"][0]["attributes"].clear(), "no positions"),
-        (lambda t: t["meshes"][0]["primitives"][0].update(mode=1), "no triangles"),
+        (lambda t: t["meshes"][0]["primitives"][0].update(mode=1), "no lists of triangles"),
         (lambda t: t["nodes"][0].update(children=[0]), "its own ancestor"),
         (lambda t: t["nodes"][0].update(mesh=4), "no mesh 4"),
         (lambda t: t["meshes"][0]["primitives"][0].update(material=7), "no material 7"),
+        (lambda t: t["meshes"][0].update(primitives="x"), "broken glTF"),
+        (lambda t: t["nodes"][0].update(matrix=[1, 2, 3]), "broken glTF"),
+        (lambda t: t["nodes"][0].update(rotation=[1, 0]), "broken glTF"),
+        (lambda t: t["meshes"][0]["primitives"][0]["attributes"].update(NORMAL=2), "no accessors 2"),
+        (_few_normals, "2 normals for 3 vertices"),
+        (_short_colour, "a colour of 2 numbers"),
     ],
 )
 def test_a_broken_file_is_refused_in_a_sentence(tmp_path, change, sentence):

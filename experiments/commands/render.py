@@ -15,7 +15,7 @@ from experiments.commands.terminal import print_table, progress
 from models.errors import TilestampError
 from simulator.run import Run
 
-MapName = Literal["quads", "tests", "ste", "overdraw", "atomics"]
+MapName = Literal["quads", "tests", "ste", "overdraw", "atomics", "race"]
 SHOWN = {  # column of the terminal table: how to print it
     "blocks": ",.0f",
     "warps": ",.0f",
@@ -227,6 +227,7 @@ def as_json(run: Run) -> dict[str, Any]:
         "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
         "counts": run.counts,
         "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
+        "warnings": list(run.frame.warnings),
     }
 
 
@@ -260,7 +261,9 @@ def _print_stages(run: Run, stages: Any, output: Path | None) -> None:
     ]
     title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {_shown_time(run)}"
     print_table(title, ["stage", *columns], rows)
-    for line in filter(None, [run.note, _shown_sample(run), f"picture: {output}" if output else ""]):
+    for line in filter(
+        None, [run.note, *run.frame.warnings, _shown_sample(run), f"picture: {output}" if output else ""]
+    ):
         sys.stdout.write(line + "\n")
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from models.simt import Simt
 from simulator.frame import Frame
+from simulator.pipelines.tiled import check_choices, not_drawn
 from simulator.scenes.scene import Scene
 from simulator.scenes.texture import texture_chains
 from simulator.scenes.textured_mesh import draws, geometry
@@ -47,6 +48,7 @@ def per_primitive(
     ssao : bool
         Screen-space ambient occlusion.
     """
+    check_choices(texture_filter=(texture_filter, ("nearest", "bilinear")))
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
@@ -59,6 +61,7 @@ def per_primitive(
         textured=bool((mesh.texture_ids >= 0).any()),
     )  # fmt: skip
     works.append(raster)
+    dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     wrong = raced.triangles != meant.triangles
     visible = Visible(raced.triangles, meant.depth) if race else meant
     fragments = interpolate(mesh, vertices, visible, perspective=perspective)
@@ -73,10 +76,22 @@ def per_primitive(
         meant.depth,
         works + finish,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
-        maps={"pixels wrong by the race": wrong.astype(np.int64)},
+        maps={"race": wrong.astype(np.int64), "pixels wrong by the race": wrong.astype(np.int64)},
         facts={
             "pixels wrong by the race": int(wrong.sum()),
             "pixels drawn": int((meant.triangles >= 0).sum()),
             "launches that the host waits for": waits,
         },
+        warnings=not_drawn(dropped) + (_raced(int(wrong.sum()), int((meant.triangles >= 0).sum())) if race else ()),
     )
+
+
+def _raced(wrong: int, drawn: int) -> tuple[str, ...]:
+    """Warn of pixels that show the wrong triangle."""
+    if not wrong:
+        return ()
+    sentence = (
+        f"{wrong:,} of {drawn:,} pixels show a triangle that is not the nearest: the fragment write is not protected "
+        "(race=False draws what was meant)"
+    )
+    return (sentence,)

@@ -15,8 +15,9 @@ from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
 from simulator.stages.ru2016.clear import clear
 from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from simulator.stages.ru2016.tile_lists import Capacity, tile_lists
-from simulator.stages.ru2016.tiled_raster import tiled_raster
+from simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
 from simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from simulator.work import Work
 
 TILES = range(4, 33)  # pixels on a side; 33x33 threads would be more than a block can have
 
@@ -85,23 +86,51 @@ def tiled(
     waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
     sizes = np.diff(lists.starts)
+    dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     return Frame(
         image,
         visible.depth,
         works + finish,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
-        maps={"list length": sizes.reshape(-(-height // tile), -1)},
+        maps=_maps(sizes, raster, -(-height // tile)),
         facts={
             "tile": tile,
             "list entries": int(sizes.sum()),
             "longest list": int(sizes.max()),
             "list entries lost by overflow": lost,
-            "triangles not drawn (behind the eye, or not finite)": len(scene.mesh.triangles) - len(drawable)
-            if scene.mesh
-            else 0,
+            "triangles not drawn (behind the eye, or not finite)": dropped,
             "launches that the host waits for": waits,
         },
+        warnings=not_drawn(dropped) + _overflow(lost, int(sizes.sum())),
     )
+
+
+def _maps(sizes: NDArray[np.int64], raster: Work, rows: int) -> dict[str, NDArray[Any]]:
+    """Heat maps: a cell a tile."""
+    tests, hits = (raster.table[:, event] for event in (TiledRasterEvent.SAMPLE_TESTS, TiledRasterEvent.SAMPLE_HITS))
+    ste = np.divide(hits, tests, out=np.zeros(len(tests)), where=tests > 0)
+    maps = {"tests": tests, "ste": ste, "atomics": sizes, "list length": sizes}
+    return {name: counts.reshape(rows, -1) for name, counts in maps.items()}
+
+
+def not_drawn(dropped: int) -> tuple[str, ...]:
+    """Warn of triangles that the original cannot draw."""
+    if not dropped:
+        return ()
+    return (
+        f"{dropped:,} triangles with a corner behind the eye, or not finite, are left out: the original cannot clip",
+    )
+
+
+def _overflow(lost: int, kept: int) -> tuple[str, ...]:
+    """Warn of list entries that found no room."""
+    if not lost:
+        return ()
+    sentence = (
+        f"{lost:,} of {lost + kept:,} list entries found no room and are not drawn, where the original would have "
+        "written into the next list: capacity=safe has room for all"
+    )
+    return (sentence,)
 
 
 def check_choices(**options: tuple[Any, tuple[Any, ...]]) -> None:

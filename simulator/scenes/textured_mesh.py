@@ -111,6 +111,16 @@ def read_gltf(path: str | Path) -> Mesh:
         A broken file, an extension that is not read, or no triangles.
     """
     file = GltfFile(Path(path))
+    try:
+        return _read(file)
+    except TilestampError:
+        raise
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:  # a value of another kind or length
+        raise TilestampError(f"{file.path.name}: broken glTF: {error}") from None
+
+
+def _read(file: GltfFile) -> Mesh:
+    """Join the parts of a file."""
     parts: list[dict[str, Any]] = []
     images: dict[int, int] = {}
     meshes = file.tree.get("meshes", [])
@@ -123,7 +133,7 @@ def read_gltf(path: str | Path) -> Mesh:
             if primitive.get("mode", TRIANGLES) == TRIANGLES
         ]
     if not parts:
-        raise TilestampError(f"{file.path.name}: has no triangles")
+        raise TilestampError(f"{file.path.name}: has no lists of triangles (strips, fans, lines, points are not read)")
     return _join(parts, tuple(file.image(image) for image in images))
 
 
@@ -175,6 +185,8 @@ def _material(file: GltfFile, primitive: dict[str, Any], images: dict[int, int])
         raise TilestampError(f"{file.path.name}: broken glTF: there is no material {index}")
     surface = materials[index].get("pbrMetallicRoughness", {}) if index >= 0 else {}
     color = np.asarray(surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), np.float32)
+    if color.shape != (4,):
+        raise TilestampError(f"{file.path.name}: broken glTF: material {index} has a colour of {color.size} numbers")
     texture = surface.get("baseColorTexture", {}).get("index", -1)
     if texture < 0:
         return color, -1
@@ -195,6 +207,8 @@ def _normals(
     if "NORMAL" not in attributes:
         return vertex_normals(positions, triangles)
     normals = file.accessor(attributes["NORMAL"]).astype(np.float64) @ np.linalg.pinv(matrix[:3, :3])
+    if len(normals) != len(positions):
+        raise TilestampError(f"{file.path.name}: broken glTF: {len(normals)} normals for {len(positions)} vertices")
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return (normals / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
 
