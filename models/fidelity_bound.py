@@ -24,11 +24,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from models.schedule import Loads
-
-Cycles = NDArray[np.float64]
 
 
 class Latest(NamedTuple):
@@ -47,55 +44,90 @@ def latest_end(units: Loads) -> Latest:
     units : Loads
         What is played.
     """
-    sm, alone = units.sm, units.alone
-    taken = units.places[units.places > 0]
-    resident, least, most = int(taken.sum()), int(taken.min()), int(taken.max())
-    waiting = len(alone) > resident
-    if not len(alone):
-        return Latest(0.0, 0.0, waiting)
-    together = min(most, -(-len(alone) // len(taken)) + most - least)  # of one SM: starts go where most places are free
-    low, high = _extremes(sm / alone, least, together)
-    stretch, served = _served(units, taken, together, waiting=waiting)
-    own, shared = _chord(low, high)
-    full = (own * alone + shared * most * sm) * (stretch / resident) if waiting else np.zeros(len(alone))
-    crowd = _chord(0.0, high)[1] * _sum_highest(sm, together)
-    longest = float(alone.max())
+    if not len(units.alone):
+        return Latest(0.0, 0.0, waiting=False)
+    return Latest(*_latest_end(*units[:3], units.places[units.places > 0], units.interval))
+
+
+@njit(cache=True, nogil=True)
+def _latest_end(sm: Any, chip: Any, alone: Any, taken: Any, interval: float) -> tuple[float, float, bool]:
+    """Cycles, tail and whether units wait, of the SMs that hold any."""
+    units = len(alone)
+    resident, least, most = taken.sum(), taken.min(), taken.max()
+    waiting = units > resident
+    together = min(most, -(-units // len(taken)) + most - least)  # of one SM: starts go where most places are free
+    rate = sm / alone
+    high = _sum_highest(rate, together, 1.0)
+    own, shared = _chord(-_sum_highest(rate, least, -1.0), high)
+    served = np.zeros(units)  # cycles for which each unit keeps the chip's servers
+    stretch = _serve(served, sm, chip, alone, taken, together, waiting)
+    full = np.zeros(units)  # cycles for which each unit keeps the machine full
+    longest = 0.0
+    for i in range(units):
+        longest = max(longest, alone[i])
+        if waiting:
+            full[i] = (own * alone[i] + shared * most * sm[i]) * (stretch / resident)
+    crowd = _chord(0.0, high)[1] * _sum_highest(sm, together, 1.0)
     tail = min(longest * max(1.0, high), longest + crowd)
-    left = _sum_highest(full + served, min(resident, len(alone)) - 1) if units.interval else 0.0
-    start, last = _starts(full, served, alone, units.interval, left, max(1.0, high))
+    left = _sum_highest(full + served, min(resident, units) - 1, 1.0) if interval > 0.0 else 0.0
+    start, last = _starts(full, served, alone, interval, left, max(1.0, high))
     end = min(start + tail, last)
-    return Latest(end, end - start, waiting)
+    return end, end - start, waiting
 
 
-def _served(units: Loads, taken: NDArray[np.int64], together: int, *, waiting: bool) -> tuple[float, Cycles]:
-    """How the chip stretches time: share of the SMs' own time that stays, and cycles that each unit adds."""
-    calls = np.ascontiguousarray(units.chip.T)
-    totals = calls.sum(axis=1)
-    busiest = int(totals.argmax())
-    stretch, served = 1.0, np.zeros(len(units.alone))
-    for k in np.flatnonzero(totals):
-        if k != busiest and (calls[k] <= calls[busiest]).all():
-            continue  # never the fullest
-        low, high = _server_load(calls[k], units, taken, together)
+@njit(cache=True, nogil=True)
+def _serve(served: Any, sm: Any, chip: Any, alone: Any, taken: Any, together: int, waiting: bool) -> float:
+    """Add the cycles that each unit keeps the chip's servers; return the share of the SMs' own time that stays."""
+    servers = chip.shape[1]
+    totals = np.zeros(servers)
+    for i in range(len(alone)):
+        for k in range(servers):
+            totals[k] += chip[i, k]
+    busiest = int(np.argmax(totals))
+    stretch = 1.0
+    for k in range(servers):
+        if totals[k] == 0.0 or (k != busiest and _never_fuller(chip, k, busiest)):
+            continue
+        low, high = _server_load(chip, k, sm, alone, taken, together)
         own, shared = _chord(low if waiting and k == busiest else 0.0, high)
-        served += shared * calls[k]
-        stretch = own if k == busiest else stretch
-    return stretch, served
+        if k == busiest:
+            stretch = own
+        for i in range(len(alone)):
+            served[i] += shared * chip[i, k]
+    return stretch
 
 
-def _server_load(calls: Cycles, units: Loads, taken: NDArray[np.int64], together: int) -> tuple[float, float]:
+@njit(cache=True, nogil=True)
+def _never_fuller(chip: Any, k: int, busiest: int) -> bool:
+    """Tell whether every unit asks more of the busiest server than of server k."""
+    for i in range(len(chip)):  # noqa: SIM110 - plain loops compile to plain code
+        if chip[i, k] > chip[i, busiest]:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _server_load(chip: Any, k: int, sm: Any, alone: Any, taken: Any, together: int) -> tuple[float, float]:
     """Lowest load of a server while every place is taken, and its highest at any time.
 
-    An SM of load S slows the calls of its residents too: by max(1, S), so they are never above calls / sm.
+    An SM of load S slows the calls of its residents too: by max(1, S), so they are never above their share of sm.
     """
-    rate = calls / units.alone
-    ratio = np.divide(calls, units.sm, out=np.full(len(calls), np.inf), where=units.sm > 0)
-    low, high = _extremes(rate, int(taken.min()), together)
+    rate = np.empty(len(alone))
+    fewest, most = np.inf, 0.0
+    for i in range(len(alone)):
+        rate[i] = chip[i, k] / alone[i]
+        ratio = chip[i, k] / sm[i] if sm[i] > 0.0 else np.inf
+        fewest = min(fewest, ratio)
+        most = max(most, ratio)
     sms = len(taken)
-    high = sms * min(high, float(ratio.max()))
-    return sms * min(low, float(ratio.min())), min(high, _sum_highest(rate, int(taken.sum()))) if high > 1.0 else high
+    low = sms * min(-_sum_highest(rate, taken.min(), -1.0), fewest)
+    high = sms * min(_sum_highest(rate, together, 1.0), most)
+    if high > 1.0:
+        high = min(high, _sum_highest(rate, taken.sum(), 1.0))
+    return low, high
 
 
+@njit(cache=True, nogil=True)
 def _chord(low: float, high: float) -> tuple[float, float]:
     """Intercept and slope of the chord of max(1, x) over [low, high]."""
     if high <= 1.0:
@@ -104,11 +136,6 @@ def _chord(low: float, high: float) -> tuple[float, float]:
         return 0.0, 1.0
     slope = (high - 1.0) / (high - low)
     return 1.0 - slope * low, slope
-
-
-def _extremes(values: Cycles, few: int, many: int) -> tuple[float, float]:
-    """Sum of the ``few`` lowest, and of the ``many`` highest."""
-    return -_sum_highest(-values, few), _sum_highest(values, many)
 
 
 @njit(cache=True, nogil=True)
@@ -137,12 +164,12 @@ def _starts(full: Any, served: Any, alone: Any, interval: float, left: float, cr
 
 
 @njit(cache=True, nogil=True)
-def _sum_highest(values: Any, count: int) -> float:
-    """Sum of the ``count`` highest, by a heap of them whose lowest is on top."""
+def _sum_highest(values: Any, count: int, sign: float) -> float:
+    """Sum of the ``count`` highest, times their sign, by a heap of them whose lowest is on top."""
     count = min(count, len(values))
     heap = np.full(max(1, count), -np.inf)
     for i in range(len(values) if count > 0 else 0):
-        value = values[i]
+        value = sign * values[i]
         if value <= heap[0]:
             continue
         hole = 0
