@@ -72,9 +72,18 @@ LANES = {
     "ATOMIC": "ATOMIC_LANES",
     "CLIP_WARPS": "CLIP_LANES",
 }
-FITTED: dict[str, dict[str, tuple[float, float]]] = {}
+FITTED: dict[str, dict[str, tuple[float, float]]] = {
+    "freepipe": {"ROW_STEPS": (3.7, 1.0)},
+    "freepipe_early": {"ROW_STEPS": (10.3, 1.0)},
+}
+DERIVED = {  # lanes that skip a body wait at its end in an instruction of their own; the second scan has shorter bodies
+    "freepipe": {"ATOMIC": 1.0, "CLIP_HITS": -5.0},
+    "freepipe_early": {"READS": 1.0, "ATOMIC": 1.0, "CLIP_HITS": -3.0},
+}
 """Warp instructions of an event beyond those of its blocks, and the lanes that run them."""
-CHAIN_FACTOR: dict[str, dict[str, float]] = {}
+CHAIN_FACTOR: dict[str, dict[str, float]] = {"freepipe": {"": 1.05}, "freepipe_early": {"": 1.3}}
+QUEUED = {"freepipe": 0.3, "freepipe_early": 0.8}
+"""Fitted to times: steps of chain_alu that a block's warps wait for each atomic request in front of them."""
 
 
 def code_of(listing: Path, kernel: str) -> dict[int, Block]:
@@ -85,15 +94,14 @@ def code_of(listing: Path, kernel: str) -> dict[int, Block]:
 def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
     """Prices of all events of one kernel."""
     begins = {e: tuple(r._replace(times=_BEGINS[e]) for r in RUNS[kernel][e]) for e in _BEGINS}
-    return cudaraster_mix.event_prices(
-        code,
-        RUNS[kernel],
-        CHAINS[kernel] | begins,
-        LANES,
-        {"atomic"},
-        FITTED.get(kernel, {}),
-        CHAIN_FACTOR.get(kernel, {}),
-    )
+    fitted, factors = FITTED.get(kernel, {}), CHAIN_FACTOR.get(kernel, {})
+    out = cudaraster_mix.event_prices(code, RUNS[kernel], CHAINS[kernel] | begins, LANES, {"atomic"}, fitted, factors)
+    for event, count in DERIVED[kernel].items():
+        price = out.setdefault(event, {"lanes": 1.0})
+        price["control"] = price.get("control", 0.0) + count
+    about = {"provenance": "fitted", "source": "times of freepipe.csv: the SM's own requests in front"}
+    out["ATOMIC_REQUESTS"] = {"chain_alu": QUEUED[kernel]} | about
+    return out
 
 
 def main(listing: Path) -> str:

@@ -8,6 +8,7 @@ from models.events import MachineEvent as E
 from models.launch import Launch
 from models.machine import Machine
 from models.price import price
+from models.traffic import Traffic
 
 SHORTEST_US = 5.0  # kernels below are measured, and not judged
 _SECTORS = "l1tex__t_sectors_pipe_lsu_mem_global_op_{}.sum"
@@ -59,7 +60,52 @@ QUANTITIES = (
     Quantity("store sectors", (_SECTORS.format("st"),), _total(E.STORE_TRANSACTIONS), 0.05),
     Quantity("atomic sectors", (_SECTORS.format("atom"), _SECTORS.format("red")), _total(E.ATOMIC_REQUESTS), 0.05),
 )
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One row of the report that needs the caches: bytes of a launch that finds them empty.
+
+    Parameters
+    ----------
+    name : str
+    metrics : tuple of (str, float)
+        Metrics and what each counts for.
+    ours : callable
+    """
+
+    name: str
+    metrics: tuple[tuple[str, float], ...]
+    ours: Callable[[Launch, Traffic], float]
+
+
+MOVED = (
+    Moved(
+        "L2 traffic",
+        tuple(
+            (_SECTORS.format(name), -32.0 if name.endswith("hit") else 32.0)
+            for name in ("ld", "st", "atom", "red", "ld_lookup_hit")
+        ),
+        lambda _, moved: moved.l2_bytes,
+    ),
+    Moved(
+        "DRAM traffic",
+        (("dram__bytes_read.sum", 1.0), ("dram__bytes_write.sum", 1.0)),
+        lambda launch, moved: moved.dram_bytes + CODE_BYTES.get(launch.kernel, 0),
+    ),
+)
+MOVED_AIM = 0.20
+CODE_BYTES = {  # machine code, which a launch fetches too: sizes of the listings
+    "triangleSetup": 64096,
+    "binRaster": 15888,
+    "coarseRaster": 48752,
+    "fineRaster": 18928,
+    "freepipe": 31664,
+    "freepipe_early": 33152,
+}
 TIME = "time"
+WALL = "wall time"  # seconds that one prediction takes us: pictures, counts and price
+WALL_AIM = 1.0
 TIME_METRIC = "cupti_us_median"
 TIME_AIM = 0.40  # of one kernel; 0.12 on average
 

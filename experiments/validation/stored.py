@@ -1,14 +1,26 @@
 """Stored measurements: tidy CSV files, and our prediction of every kernel in them."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.validation.back_end import SHUFFLED, back_end, cameras, grids_of
-from experiments.validation.quantities import QUANTITIES, TIME, TIME_AIM, TIME_METRIC, warm_microseconds
+from experiments.validation.quantities import (
+    MOVED,
+    MOVED_AIM,
+    QUANTITIES,
+    TIME,
+    TIME_AIM,
+    TIME_METRIC,
+    WALL,
+    WALL_AIM,
+    warm_microseconds,
+)
 from models.errors import TilestampError
 from models.launch import Launch
 from models.machine import Machine
+from models.traffic import traffic
 from simulator.mix import load_mix
 from simulator.pipelines import load_pipeline
 from simulator.scenes import load_scene
@@ -21,7 +33,7 @@ Say = Callable[[str], None]
 KEYS = ["scene", "W", "tile", "spp", "kernel"]
 MICROPOLYGON, FREEPIPE, CUDARASTER = "micropolygon.csv", "freepipe.csv", "cudaraster.csv"
 VARIANT = "no_param_copy"  # CudaRaster without the copy of its parameters to local memory
-WIDEST = 1024  # pixels of FreePipe and CudaRaster scenes: wider screens take our counting minutes
+WIDEST = {FREEPIPE: 1024, CUDARASTER: 2048}  # pixels: FreePipe on wider screens takes our counting minutes
 
 
 def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
@@ -50,18 +62,18 @@ def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
 
     rows: list[dict[str, Any]] = []
     if (folder / MICROPOLYGON).is_file():
-        rows += _rows(_read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
+        rows += _rows(read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
     if (folder / FREEPIPE).is_file():
-        rows += _rows(_read(folder / FREEPIPE), _freepipe(folder, machine, say), machine)
+        rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say), machine)
     if (folder / CUDARASTER).is_file():
-        rows += _rows(_read(folder / CUDARASTER), _cudaraster(folder, machine, say), machine)
+        rows += _rows(read(folder / CUDARASTER), _cudaraster(folder, machine, say), machine)
     if not rows:
         names = f"{MICROPOLYGON}, {FREEPIPE} or {CUDARASTER}"
         raise TilestampError(f"{folder} holds no measurements that we can predict: no {names} with inputs beside it")
     return pd.DataFrame(rows)
 
 
-def _read(path: Path) -> dict[tuple[Any, ...], float]:
+def read(path: Path) -> dict[tuple[Any, ...], float]:
     """Value by scene, width, tile, samples, kernel and metric; times and cold counters only."""
     import pandas as pd
 
@@ -82,7 +94,7 @@ def _read(path: Path) -> dict[tuple[Any, ...], float]:
 def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     """Launches of every scene that has a camera, in its own order and shuffled."""
     mix = load_mix("micropolygon", machine.compute_capability)
-    measured = {key[0] for key in _read(folder / MICROPOLYGON)}
+    measured = {key[0] for key in read(folder / MICROPOLYGON)}
     for name, camera in cameras(folder).items():
         for scene in (name, name + SHUFFLED):
             if scene in measured:
@@ -94,22 +106,36 @@ def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tu
 
 
 def _freepipe(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    """Launches of every scene and size whose input is there, blind and reading first."""
     mix = load_mix("freepipe", machine.compute_capability)
-    for scene, source, width, height in _inputs(folder, FREEPIPE):
+    for key, work in freepipe_works(folder, machine, say):
+        yield key, mix.launch(work, machine.sm.warp_size)
+
+
+def freepipe_works(
+    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[FREEPIPE]
+) -> Iterator[tuple[tuple[Any, ...], Work]]:
+    """Kernels of every scene and size whose input is there, blind and reading first."""
+    for scene, source, width, height in _inputs(folder, FREEPIPE, widest):
         say(f"FreePipe: {scene} {width}x{height}")
         for kernel in ("freepipe", "freepipe_early"):
             works = _draw("freepipe", source, width, height, machine, early=kernel == "freepipe_early")
-            yield (scene, width, 0, 0, kernel), mix.launch(works[0], machine.sm.warp_size)
+            yield (scene, width, 0, 0, kernel), works[0]
 
 
 def _cudaraster(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    """Launches of the four kernels of every scene and size whose input is there."""
     mix = load_mix("cudaraster", machine.compute_capability)
-    for scene, source, width, height in _inputs(folder, CUDARASTER):
+    for key, work in cudaraster_works(folder, machine, say):
+        yield key, mix.launch(work, machine.sm.warp_size)
+
+
+def cudaraster_works(
+    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[CUDARASTER]
+) -> Iterator[tuple[tuple[Any, ...], Work]]:
+    """The four kernels of every scene and size whose input is there."""
+    for scene, source, width, height in _inputs(folder, CUDARASTER, widest):
         say(f"CudaRaster: {scene} {width}x{height}")
         for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
-            yield (scene, width, 0, 0, work.kernel), mix.launch(work, machine.sm.warp_size)
+            yield (scene, width, 0, 0, work.kernel), work
 
 
 def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine, **options: Any) -> list[Work]:
@@ -120,11 +146,11 @@ def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine
     return [work for work in frame.works if isinstance(work, Work)]
 
 
-def _inputs(folder: Path, name: str) -> Iterator[tuple[str, Path, int, int]]:
+def _inputs(folder: Path, name: str, widest: int) -> Iterator[tuple[str, Path, int, int]]:
     """Scenes, their inputs and sizes, without those that lack an input or are too wide."""
     for scene, width, height in _sizes(folder / name):
         source = folder / "ids" / f"{scene}_input.npz"
-        if width <= WIDEST and source.is_file():
+        if width <= widest and source.is_file():
             yield scene, source, width, height
 
 
@@ -139,6 +165,7 @@ def _rows(
     measured: dict[tuple[Any, ...], float], predicted: Iterator[tuple[tuple[Any, ...], Launch]], machine: Machine
 ) -> Iterator[dict[str, Any]]:
     """Ours beside measured, wherever something was measured."""
+    begun = time.perf_counter()
     for key, launch in predicted:
         about = dict(zip(KEYS, key, strict=True))
         for quantity in QUANTITIES:
@@ -147,10 +174,19 @@ def _rows(
                 ours, theirs = quantity.ours(launch), sum(parts)
                 error = ours - theirs if quantity.absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
                 yield about | _entry(quantity.name, ours, theirs, error, quantity.aim)
+        cold = traffic([launch], machine)[0]
+        for moved in MOVED:
+            theirs = sum(w * measured.get((*key, metric), 0.0) for metric, w in moved.metrics)
+            if (*key, moved.metrics[0][0]) in measured and theirs > 0:
+                ours = moved.ours(launch, cold)
+                yield about | _entry(moved.name, ours, theirs, ours / theirs - 1.0, MOVED_AIM)
         if (*key, TIME_METRIC) in measured:
             theirs = measured[(*key, TIME_METRIC)]
             ours = warm_microseconds(launch, machine)
             yield about | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
+        now = time.perf_counter()
+        yield about | _entry(WALL, now - begun, WALL_AIM, 0.0, None)
+        begun = now
 
 
 def _entry(quantity: str, ours: float, measured: float, error: float, aim: float | None) -> dict[str, Any]:

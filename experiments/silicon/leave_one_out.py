@@ -1,0 +1,124 @@
+"""One scene left out: what the fitted constants of CudaRaster and FreePipe are worth on a scene that they never saw.
+
+The mixes are read from machine code; a few numbers in them are fitted (``cudaraster_mix.FITTED``, ``freepipe_mix``).
+Here each scene is left out in turn, the instructions of the fitted events are fitted anew to the others, and the scene
+is predicted with them; chains are fitted anew by one factor a kernel. Narrow screens only, unless
+``TILESTAMP_LEAVE_OUT_WIDTH`` says how wide.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.result import Cell, Result
+from experiments.silicon import cudaraster_mix, freepipe_mix
+from experiments.silicon.h200 import SOURCE, folder
+from experiments.validation.quantities import SHORTEST_US, TIME_METRIC, warm_microseconds
+from experiments.validation.stored import CUDARASTER, FREEPIPE, cudaraster_works, freepipe_works, read
+from models.events import INSTRUCTION_CLASSES
+from models.events import MachineEvent as E
+from models.launch import Launch
+from models.machine import Machine, load_machine
+from simulator.mix import load_mix
+from simulator.work import Work
+
+SLOW = True  # counts every scene
+
+WIDTH = "TILESTAMP_LEAVE_OUT_WIDTH"
+FITTED = cudaraster_mix.FITTED | freepipe_mix.FITTED
+FACTORS = np.linspace(0.8, 1.25, 10)  # of all chains of a kernel, beside those of the mix
+INSTRUCTIONS = "smsp__inst_executed.sum"
+AIM_INSTRUCTIONS, AIM_TIME = 0.02, 0.40
+
+
+def run(progress: Callable[[str], None]) -> Result:
+    """Leave each scene out of the fits in turn."""
+    machine = load_machine("h200")
+    rows = list(_rows(machine, progress))
+    cells = []
+    for kernel in FITTED:
+        mine = [row for row in rows if row["kernel"] == kernel]
+        for scene in {row["scene"]: None for row in mine}:
+            seen = [row for row in mine if row["scene"] != scene]
+            left = [row for row in mine if row["scene"] == scene]
+            factor = _factor(seen)
+            costs = _refit(kernel, seen)
+            for row in left:
+                label = f"{scene} {row['W']}"
+                ours = _disassembled(kernel, row) + float(row["counts"] @ costs)
+                cells.append(Cell(label, f"{kernel} instructions", "", row["instructions"], ours, aim=AIM_INSTRUCTIONS))
+                if row["us"] > SHORTEST_US:
+                    cells.append(Cell(label, f"{kernel} time", "us", row["us"], _at(row, factor), aim=AIM_TIME))
+    return Result("silicon-leave-one-out", "H200, one scene left out of the fit", SOURCE, cells, [], _notes(cells))
+
+
+def _rows(machine: Machine, say: Callable[[str], None]) -> Iterator[dict[str, Any]]:
+    """Measured and counted, a kernel of a scene each."""
+    widest = int(os.environ.get(WIDTH, "512"))
+    for name, works in ((CUDARASTER, cudaraster_works), (FREEPIPE, freepipe_works)):
+        measured = read(folder() / name)
+        mix = load_mix("cudaraster" if name == CUDARASTER else "freepipe", machine.compute_capability)
+        for key, work in works(folder(), machine, say, widest):
+            if (*key, INSTRUCTIONS) in measured and (*key, TIME_METRIC) in measured:
+                launch = mix.launch(work, machine.sm.warp_size)
+                yield {
+                    "scene": key[0],
+                    "W": key[1],
+                    "kernel": key[4],
+                    "instructions": measured[(*key, INSTRUCTIONS)],
+                    "us": measured[(*key, TIME_METRIC)],
+                    "ours": float(launch.events[:, list(INSTRUCTION_CLASSES)].sum()),
+                    "counts": _counts(key[4], work),
+                    "times": np.array([warm_microseconds(_stretched(launch, f), machine) for f in FACTORS]),
+                }
+
+
+def _counts(kernel: str, work: Work) -> NDArray[np.float64]:
+    """How often the fitted events of a kernel happened."""
+    return np.array([work.total(work.events[event]) for event in FITTED[kernel]], np.float64)
+
+
+def _stretched(launch: Launch, factor: float) -> Launch:
+    """The launch with longer arithmetic chains."""
+    events = launch.events.copy()
+    events[:, E.CHAIN_ALU] *= factor
+    return replace(launch, events=events)
+
+
+def _disassembled(kernel: str, row: dict[str, Any]) -> float:
+    """Instructions without those of the fit."""
+    costs = np.array([count for count, _ in FITTED[kernel].values()])
+    return float(row["ours"] - row["counts"] @ costs)
+
+
+def _refit(kernel: str, rows: list[dict[str, Any]]) -> NDArray[np.float64]:
+    """Instructions of each fitted event, least squares of relative errors."""
+    measured = np.array([row["instructions"] for row in rows])
+    rest = np.array([_disassembled(kernel, row) for row in rows])
+    counts = np.stack([row["counts"] for row in rows])
+    costs: NDArray[np.float64] = np.linalg.lstsq(counts / measured[:, None], 1.0 - rest / measured, rcond=None)[0]
+    return costs
+
+
+def _factor(rows: list[dict[str, Any]]) -> int:
+    """Which factor of the chains fits the times of some scenes best."""
+    errors = np.stack([row["times"] / row["us"] - 1.0 for row in rows if row["us"] > SHORTEST_US] or [FACTORS - 1.0])
+    return int(np.argmin((errors**2).sum(axis=0)))
+
+
+def _at(row: dict[str, Any], factor: int) -> float:
+    return float(row["times"][factor])
+
+
+def _notes(cells: list[Cell]) -> list[str]:
+    """Mean and worst error by kernel and quantity."""
+    notes = []
+    for column in {cell.column: None for cell in cells}:
+        errors = [abs(cell.error or 0.0) for cell in cells if cell.column == column]
+        mean, worst = 100 * float(np.mean(errors)), 100 * max(errors)
+        notes.append(f"{column}: {len(errors)} cells, mean error {mean:.1f} %, worst {worst:.1f} %.")
+    return notes
