@@ -134,7 +134,12 @@ def _figures(cells: list[Cell]) -> list[Figure]:
     """Draw ours beside his."""
     bars = pd.DataFrame(
         [
-            {"cell": f"{c.row} {c.column}", "ours": c.ours, "published": c.published, "status": c.status}
+            {
+                "cell": f"{c.row} {c.column}".replace("_", " "),
+                "ours": c.ours,
+                "published": c.published,
+                "status": c.status,
+            }
             for c in cells
             if c.unit == "ms"
         ]

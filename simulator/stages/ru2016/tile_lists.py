@@ -17,8 +17,10 @@ from models.launch import Stream
 from models.simt import Simt
 from simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
 from simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
+from simulator.stages.thread_per_item import Access, thread_per_item
 from simulator.work import Work
 
+SCAN_BLOCK = 256  # threads (ours: the original has no scan)
 SMALL_MODEL = 100  # triangles up to which a list can hold all of them
 COORDINATES = 6  # words read of each primitive: x and y of its corners
 SECTOR_BYTES = 32  # loads of compute capability 3.0 pass by L1 and move such sectors
@@ -71,7 +73,7 @@ def tile_lists(
     -------
     TileLists
     works : list of Work
-        The counting launch (``safe`` only) and the filling one.
+        The counting launch and the scan (``safe`` only), and the filling one.
     lost : int
         Appends without room: 0 with ``safe``.
     """
@@ -99,7 +101,13 @@ def tile_lists(
     starts = np.concatenate([[0], np.cumsum(kept)]).astype(np.int64)
     entries = np.empty(int(starts[-1]), np.int32)
     _, lost, filling = launch("tile_lists", starts, entries)
-    return TileLists(starts, entries), [filling] if room else [counting, filling], lost
+    return TileLists(starts, entries), [filling] if room else [counting, _scan(tiles, simt), filling], lost
+
+
+def _scan(tiles: int, simt: Simt) -> Work:
+    """Sum the counts of the tiles before each: where its list begins."""
+    counts, starts = Access("tile_counters", 4, 1), Access("tile_starts", 4, 1)
+    return thread_per_item("tile_lists", "tile_scan", tiles, SCAN_BLOCK, simt, (counts,), (starts,))
 
 
 def _add_primitive_loads(events: NDArray[np.int64], simt: Simt) -> None:
