@@ -128,7 +128,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     """Price of slots that nothing needs, and of a smaller bound."""
     spared = table[(table.lost_pixels == 0) & (table.wide_slots_ms > table.four_slots_ms)]
     more = [
-        f"{100 * (r.wide_slots_ms / r.four_slots_ms - 1):.0f} % ({r.amplitude:g} at {r.bound:g})"
+        f"{100 * (r.wide_slots_ms / r.four_slots_ms - 1):.1f} % ({r.amplitude:g} at {r.bound:g})"
         for r in spared.itertuples()
     ]
     calm = table[table.amplitude == AMPLITUDES[0]]

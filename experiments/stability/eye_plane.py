@@ -25,8 +25,8 @@ WIDTH, HEIGHT = 96, 64  # pixels
 SIDE = 1.0  # of the floor, around the point below the eye: distances are in patch sides
 NEAR = 0.002  # patch sides
 DISTANCES = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4, 1e-5)
-DEPTHS = (8, 10, 12, MAX_DEPTH)
-TOLERANCE = 0.05  # of a boundary, relative
+DEPTHS = (10, 12, MAX_DEPTH)
+TOLERANCE = 0.08  # of a boundary, relative
 FLOOR = flat_patch([[[-0.5, -0.5, 0], [0.5, -0.5, 0]], [[-0.5, 0.5, 0], [0.5, 0.5, 0]]])
 
 
@@ -93,7 +93,7 @@ def run(progress: Progress) -> Result:
     growth = int(passes[-2] - passes[-3])
     notes = [
         f"At distance {DISTANCES[-1]:g} the queue grows by {growth} sub-patches a pass and would go on so for ever.",
-        f"Each further halving allows {_ratio(found):.2f} times the distance: twice the bits of an entry, no cure.",
+        f"A further halving, two bits of an entry, allows {_ratio(found):.2f} times the distance; none allows zero.",
     ]
     figures = [
         Figure("queue", _draw_queue),

@@ -84,7 +84,7 @@ def run(progress: Progress) -> Result:
             "layers over the screen",
             "",
             *stream_boundary(),
-            f"{beyond_the_stream(LAYERS[-1])} fragments at {LAYERS[-1]} layers lie beyond its room of {OVERDRAW} a pixel"
+            f"{beyond_the_stream(LAYERS[-1])} fragments at {LAYERS[-1]} layers exceed its room of {OVERDRAW} a pixel"
             " (a quad takes four)",
             "let it grow, as here",
             f"{4 * FRAGMENT_OUT_BYTES} bytes a quad",

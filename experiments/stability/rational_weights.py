@@ -77,7 +77,13 @@ def run(progress: Progress) -> Result:
     table = pd.DataFrame(rows)
     boundaries = [_boundary(table, cure) for cure in CURES]
     boundaries += [
-        Boundary(f"micropolygon, at most {depth} halvings", "weight of one edge", "", *boundary(depth), "the same")
+        Boundary(
+            f"micropolygon, at most {depth} halvings",
+            "weight of one edge",
+            "",
+            *boundary(depth),
+            "sub-patches are dropped",
+        )
         for depth in DEPTHS[:-1]
     ]
     shown = [table[(table.cure == cure) & (table.weight == WEIGHTS[3])].iloc[0] for cure in CURES]
