@@ -146,13 +146,14 @@ def _boundary(turn: float, kind: MaskKind) -> Boundary:
 def _notes() -> list[str]:
     """What the masks cost on the most folded patch."""
     fold = FOLDS[-1]
-    ways = [(kind, masked(fold, 0, kind)[1], "bit-mask") for kind in KINDS]
+    ways: list[tuple[str, Work, str]] = [(kind, masked(fold, 0, kind)[1], "bit-mask") for kind in KINDS]
     ways.append(("no mask", exact(fold, 0)[1], "across-polygons"))
     costs = [
         f"{milliseconds([work], MACHINE, pipeline):.4g} ms and {work.counts()['SAMPLE_TESTS']} tests ({name})"
         for name, work, pipeline in ways
     ]
-    return [f"Folded by {fold} degrees, one patch of {CELLS**2} micropolygons takes " + ", ".join(costs) + "."]
+    one = f"one patch of {CELLS**2} micropolygons, which one warp draws under a mask"
+    return [f"Folded by {fold} degrees, {one}, takes " + ", ".join(costs) + "."]
 
 
 def _plot(table: "pd.DataFrame", path: "Path") -> None:
