@@ -79,7 +79,7 @@ def status(scene: str, kernel: str, quantity: str) -> Status:
     """Whether a number of the model was chosen on this cell."""
     if kernel.startswith("k_raster"):
         return "fitted" if scene == CONSTANTS and quantity == TIME else "predicted"
-    return "fitted" if quantity in FITTED.get(kernel, set()) else "predicted"
+    return "fitted" if quantity in FITTED.get(kernel.removesuffix(" as published"), set()) else "predicted"
 
 
 def _cells(table: "pd.DataFrame") -> list[Cell]:

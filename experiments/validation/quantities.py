@@ -79,6 +79,14 @@ class Moved:
     ours: Callable[[Launch, Traffic], float]
 
 
+CODE_BYTES = {  # machine code, which a launch fetches too: sizes of the listings
+    "triangleSetup": 64096,
+    "binRaster": 15888,
+    "coarseRaster": 48752,
+    "fineRaster": 18928,
+    "freepipe": 31664,
+    "freepipe_early": 33152,
+}
 MOVED = (
     Moved(
         "L2 traffic",
@@ -95,14 +103,6 @@ MOVED = (
     ),
 )
 MOVED_AIM = 0.20
-CODE_BYTES = {  # machine code, which a launch fetches too: sizes of the listings
-    "triangleSetup": 64096,
-    "binRaster": 15888,
-    "coarseRaster": 48752,
-    "fineRaster": 18928,
-    "freepipe": 31664,
-    "freepipe_early": 33152,
-}
 TIME = "time"
 WALL = "wall time"  # seconds that one prediction takes us: pictures, counts and price
 WALL_AIM = 1.0

@@ -24,6 +24,7 @@ from models.traffic import traffic
 from simulator.mix import load_mix
 from simulator.pipelines import load_pipeline
 from simulator.scenes import load_scene
+from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from simulator.work import Work
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 KEYS = ["scene", "W", "tile", "spp", "kernel"]
 MICROPOLYGON, FREEPIPE, CUDARASTER = "micropolygon.csv", "freepipe.csv", "cudaraster.csv"
-VARIANT = "no_param_copy"  # CudaRaster without the copy of its parameters to local memory
+AS_PUBLISHED = "as_published"  # CudaRaster whose setup and bin raster copy their parameters to local memory
 WIDEST = {FREEPIPE: 1024, CUDARASTER: 2048}  # pixels: FreePipe on wider screens takes our counting minutes
 
 
@@ -83,7 +84,9 @@ def read(path: Path) -> dict[tuple[Any, ...], float]:
         raise TilestampError(f"{path} lacks the columns {', '.join(sorted(missing))}")
     table = table[table.source.isin(["cupti", "ncu_cold"])]
     if path.name == CUDARASTER:
-        table = table[table.variant == VARIANT]
+        copied = table.variant == AS_PUBLISHED
+        table = table[~copied | table.kernel.isin(COPYING)]
+        table = table.assign(kernel=table.kernel.where(table.variant != AS_PUBLISHED, table.kernel + " as published"))
     for column in ("tile", "spp"):
         if column not in table:
             table = table.assign(**{column: 0})
@@ -136,6 +139,8 @@ def cudaraster_works(
         say(f"CudaRaster: {scene} {width}x{height}")
         for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
             yield (scene, width, 0, 0, work.kernel), work
+            if work.kernel in COPYING:
+                yield (scene, width, 0, 0, f"{work.kernel} as published"), with_parameter_copy(work)
 
 
 def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine, **options: Any) -> list[Work]:

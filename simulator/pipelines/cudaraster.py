@@ -21,6 +21,7 @@ from simulator.scenes.scene import Scene
 from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
 from simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
+from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from simulator.stages.laine2011.triangle_setup import SLACK, Release, triangle_setup
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 from simulator.work import Work
@@ -58,6 +59,7 @@ def cudaraster(
     mode: Mode = "depth",
     cull_backfaces: bool | None = None,
     batches: int = 1,
+    copy_parameters: bool = False,
     counting: bool = True,
     sample: Sampler | None = None,
 ) -> Frame:
@@ -83,6 +85,8 @@ def cudaraster(
         None: as published, on in 1.1, off in nvdiffrast.
     batches : int
         Draws that the triangles are divided among; the first clears.
+    copy_parameters : bool
+        As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory.
     counting : bool
     sample : Sampler, optional
         Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
@@ -99,6 +103,8 @@ def cudaraster(
         Where the scene or an option cannot be drawn.
     """
     _check(release, mode, batches)
+    if copy_parameters and release != "nvdiffrast":
+        raise TilestampError(f"copy_parameters: release {release} does not copy them; nvdiffrast does")
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
@@ -108,6 +114,8 @@ def cudaraster(
     state = _State(options, (width, height), simt, counting, colors)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
         _draw(state, positions, mesh.triangles[first:last], first)
+    if copy_parameters:
+        state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
