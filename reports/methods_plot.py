@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = 3
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": "black", "linewidth": 0.9},
+    {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
+)
 AMPLIFIED = 4.0  # differences are shown so many times as large
 
 
@@ -25,6 +29,7 @@ def panels(
     x: str,
     y: str,
     front: str,
+    second: str,
     x_label: str,
     y_label: str,
     title: str,
@@ -37,8 +42,8 @@ def panels(
         A row a point; an error of zero is drawn at the foot of its panel.
     path : Path
         PNG to write.
-    panel, group, x, y, front : str
-        Columns; ``front`` is bool.
+    panel, group, x, y, front, second : str
+        Columns; ``front`` and ``second``, of software alone, are bool.
     """
     names = list(dict.fromkeys(table[panel]))
     groups = list(dict.fromkeys(table[group]))
@@ -46,7 +51,7 @@ def panels(
     size = (4.1 * COLUMNS, 3.3 * rows + 0.9)
     with figure(path, title, nrows=rows, ncols=COLUMNS, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
-            _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, front)
+            _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, (front, second))
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
         for axes in grid[:, 0]:
@@ -56,13 +61,13 @@ def panels(
             last.set_xlabel(x_label, fontsize=8)
         handles = [_mark(k) for k in range(len(groups))]
         grid[0, 0].figure.legend(
-            [*handles, _line()], [*groups, "front"], loc="lower center", ncols=min(len(groups) + 1, 6), fontsize=8,
-            bbox_to_anchor=(0.5, -0.005 - 0.03 * (len(groups) > 5)),
+            [*handles, *map(_line, LINES)], [*groups, "front", "front of software"], fontsize=8,
+            loc="upper right", ncols=min(len(groups) + 2, 7), bbox_to_anchor=(1.0, 1.0 - 0.28 / size[1]),
         )  # fmt: skip
 
 
 def _panel(
-    axes: Any, rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, front: str
+    axes: Any, rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, fronts: tuple[str, str]
 ) -> None:
     positive = rows[y][rows[y] > 0]
     foot = 10.0 ** np.floor(np.log10(positive.min()) - 0.3) if len(positive) else 1e-6
@@ -70,8 +75,9 @@ def _panel(
     for index, key in enumerate(groups):
         mine = rows[group] == key
         axes.plot(rows[x][mine], heights[mine], **_style(index))
-    best = rows.assign(height=heights)[rows[front]].sort_values([x, "height"])
-    axes.step(best[x], best["height"], where="post", color="black", linewidth=0.9)
+    for front, line in zip(fronts, LINES, strict=True):
+        best = rows.assign(height=heights)[rows[front]].sort_values([x, "height"])
+        axes.step(best[x], best["height"], where="post", **line)
     axes.set(xscale="log", yscale="log")
     axes.set_title(name, fontsize=9)
     axes.tick_params(labelsize=7)
@@ -91,10 +97,10 @@ def _mark(index: int) -> Any:
     return Line2D([], [], **_style(index))
 
 
-def _line() -> Any:
+def _line(style: dict[str, Any]) -> Any:
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], color="black", linewidth=0.9)
+    return Line2D([], [], **style)
 
 
 def side_by_side(truth: NDArray[np.float64], image: NDArray[np.float64], path: Path, *, title: str) -> None:

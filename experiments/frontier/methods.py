@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from experiments.frontier.methods_notes import notes
-from experiments.frontier.methods_scenes import Subject, lattice, patches, subjects, textured_subject
+from experiments.frontier.methods_scenes import AREAS, AREAS_LONG, Subject, lattice, patches, subjects, textured_subject
 from experiments.frontier.methods_truth import Truth
 from experiments.frontier.methods_variants import (
     ALL_PATCHES,
@@ -24,7 +24,7 @@ from experiments.frontier.methods_variants import (
 )
 from experiments.frontier.model_frames import is_long
 from experiments.frontier.pareto import pareto_front
-from experiments.frontier.picture_error import depth_errors, flip, pixel_errors
+from experiments.frontier.picture_error import depth_errors, pixel_errors
 from experiments.registry import Progress
 from experiments.result import Cell, Figure, Result
 from models.errors import TilestampError
@@ -90,7 +90,7 @@ def run(progress: Progress) -> Result:
 
 def _grid() -> Iterator[tuple[Subject, list[Variant]]]:
     """Scenes, and what draws each."""
-    for subject in subjects():
+    for subject in subjects(AREAS_LONG if is_long() else AREAS):
         yield subject, ALL_TRIANGLES if is_long() else QUICK_TRIANGLES
     yield patches(), ALL_PATCHES if is_long() else QUICK_PATCHES
     yield textured_subject(), FILTERED if is_long() else [v for v in FILTERED if v.pipeline == "tiled"]
@@ -115,7 +115,8 @@ def _row(drawn: Drawn) -> dict[str, Any]:
         "scene": drawn.subject.name,
         "pipeline": variant.pipeline,
         "method": variant.label,
-        "flip": flip(drawn.truth.picture(variant.pipeline), frame.image),
+        "fixed_function": variant.pipeline == "hardware" or bool(variant.options.get("hybrid")),
+        "flip": drawn.truth.flip(variant.pipeline, frame.image),
     }
     made = drawn.truth.geometry(variant.pipeline)
     if frame.triangle_ids is None or made.ids is None:
@@ -143,11 +144,14 @@ def _milliseconds(drawn: Drawn) -> Iterator[tuple[str, float]]:
 
 
 def _mark_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
-    """Add whether anything beats a row in both, of its scene and machine, by FLIP and by wrong pixels."""
+    """Add whether anything of a row's scene and machine beats it in both time and error, and anything in software."""
     for error in MEASURES:
         table[f"front_{error}"] = False
+        table[f"software_front_{error}"] = False
         for _, rows in table.groupby(["scene", "machine"], sort=False):
             table.loc[rows.index, f"front_{error}"] = pareto_front(rows["ms"], rows[error])
+            soft = rows[~rows.fixed_function]
+            table.loc[soft.index, f"software_front_{error}"] = pareto_front(soft["ms"], soft[error])
     return table
 
 
@@ -193,11 +197,11 @@ def _figures(table: "pd.DataFrame", worst: dict[str, tuple[float, Drawn]]) -> li
 def _front(table: "pd.DataFrame", machine: str, error: str) -> Figure:
     """Time against one measure of error, a panel a scene."""
     rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
+    rows = rows.assign(front=rows[f"front_{error}"], second=rows[f"software_front_{error}"])
     words, title = MEASURES[error]
-    draw = partial(
-        panels, rows.assign(front=rows[f"front_{error}"]), panel="scene", group="pipeline", x="ms", y=error,
-        front="front", x_label="modelled time [ms]", y_label=words, title=f"{title} against modelled time, {machine}",
-    )  # fmt: skip
+    columns = {"panel": "scene", "group": "pipeline", "x": "ms", "y": error, "front": "front", "second": "second"}
+    labels = {"x_label": "modelled time [ms]", "y_label": words, "title": f"{title} against modelled time, {machine}"}
+    draw = partial(panels, rows, **columns, **labels)
     return Figure(f"{machine}-{error}", draw)
 
 

@@ -14,7 +14,7 @@ SHEETS = ((17.0, 1.0, (0.95, 0.55, 0.25)), (-38.0, -1.0, (0.25, 0.55, 0.95)))  #
 JITTER = 0.18  # of a leg of a triangle, by which its corners are moved
 RELIEF = 0.05  # depth of the waves, of the range -1 to 1
 TEXELS = 64  # along the texture
-AREAS = (0.1, 1.0, 10.0, 100.0, 1000.0)  # pixels a triangle
+AREAS, AREAS_LONG = (0.1, 10.0, 1000.0), (0.1, 1.0, 10.0, 100.0, 1000.0)  # pixels a triangle
 SIZE, SMALL = (192, 144), (96, 72)  # pixels; the small one where triangles are smallest, and a million otherwise
 LATTICE = (128, 64)  # pixels: powers of two, so that the corners are exact in clip space
 
@@ -40,10 +40,10 @@ class Subject:
     matrix: NDArray[np.float64]
 
 
-def subjects() -> list[Subject]:
-    """Sheets of all areas, and a model of triangles."""
+def subjects(areas: tuple[float, ...] = AREAS) -> list[Subject]:
+    """Sheets of some areas, and a model of triangles."""
     made = []
-    for area in AREAS:
+    for area in areas:
         size = SMALL if area < 1.0 else SIZE
         made.append(Subject(f"{area:g} px", sheets(area, *size), *size, np.eye(4)))
     return [*made, Subject("spot", real("spot", *SIZE), *SIZE, np.eye(4))]
@@ -164,7 +164,8 @@ def _scene(
 ) -> Scene:
     """A clip-space scene whose normals face the eye, so that pipelines that light it leave its colours as they are."""
     normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(positions), 1))
-    mesh = Mesh(positions, triangles, colors, normals, True, uvs, texture_ids, textures)
+    indices = np.ascontiguousarray(triangles, np.int32)
+    mesh = Mesh(positions, indices, colors, normals, True, uvs, texture_ids, textures)
     return clip_space_scene(mesh, name)
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.frontier.methods_scenes import Subject
 from experiments.frontier.methods_variants import Variant
+from experiments.frontier.picture_error import flip
 from models.machine import load_machine
 from simulator.pipelines._cudaraster_image import shown_sample
 from simulator.reference.coverage import CENTRE, Visible, homogeneous_corners, screen_corners, visibility
@@ -52,6 +53,7 @@ class Truth:
     _geometries: dict[str, Geometry] = field(default_factory=dict)
     _seen: dict[tuple[str, tuple[float, float]], Visible] = field(default_factory=dict)
     _pictures: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    _flips: dict[tuple[str, bytes], float] = field(default_factory=dict)
 
     def geometry(self, pipeline: str) -> Geometry:
         """Triangles that ``pipeline`` ought to draw, in its own shading."""
@@ -82,6 +84,13 @@ class Truth:
                 background=made.background, **texture,
             )  # fmt: skip
         return self._pictures[kind]
+
+    def flip(self, pipeline: str, image: NDArray[np.uint8]) -> float:
+        """FLIP error of an image; that of one seen before is known."""
+        key = _kind(self.subject, pipeline), image.tobytes()
+        if key not in self._flips:
+            self._flips[key] = flip(self.picture(pipeline), image)
+        return self._flips[key]
 
 
 def shown_offset(variant: Variant) -> tuple[float, float]:
