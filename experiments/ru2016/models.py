@@ -92,7 +92,7 @@ def _notes(runs: dict[str, dict[str, Run]], breakdown: pd.DataFrame) -> list[str
         ),
         (
             f"Hypotheses: 45 taken as radians, {RADIAN_VIEW:.1f} degrees; 16x16 tiles; models not turned. He turned "
-            "and zoomed by mouse and says nowhere how: in his times flower and box show more of themselves than in ours."
+            "and zoomed by mouse, and says nowhere how: his times see more of flower and box than ours do."
         ),
         (
             "One thread a triangle is bound by its longest thread: a hit waits for w, for the old depth, and for each "
