@@ -76,9 +76,9 @@ def _notes() -> list[str]:
         ),
         (
             "Kernels like the first six also ran on an H200 with this very scene. They made as many entries of bins "
-            "(2,981), of tiles (18,043; here 18,039), queues (4,775) and Hi-Z updates (139) as are counted here, so there "
-            "the model is tested with GPU and view known. The later four were not compared: that copy of FineRasterizer "
-            "covered fewer pixels than ours, for a reason not found."
+            "(2,981), of tiles (18,043; here 18,039), tile queues (4,775) and Hi-Z updates (139) as are counted here: "
+            "there the model is tested with GPU and view known. The later four were not compared: that copy of "
+            "FineRasterizer covered fewer pixels than ours, for a reason not found."
         ),
         (
             f"Triangles that the cooperative compaction can take by the machine file: {limits}: six resident blocks of "
