@@ -1,11 +1,21 @@
 """The mix from machine code: blocks, classes, and what each section of a kernel holds."""
 
+import numpy as np
 import pytest
 
+from experiments.silicon.cudaraster_blocks import CHAINS, LANES, RUNS, Run
+from experiments.silicon.cudaraster_mix import FITTED, chain, instructions
 from experiments.silicon.h200 import status
+from experiments.silicon.leave_one_out import _refit
 from experiments.silicon.mix_from_sass import RASTER, main
 from experiments.silicon.raster_sections import raster_sections
 from experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
+from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from simulator.stages.laine2011.parameter_copy import with_parameter_copy
+from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
+from simulator.work import Work
 
 LISTING = "silicon/src/micropolygon_sm90.sass.xz"
 
@@ -58,3 +68,47 @@ def test_a_cell_that_gave_a_number_is_fitted_and_no_other():
     assert status("bunny", "freepipe", "instructions") == "fitted"
     assert status("bunny", "freepipe_early", "load sectors") == "predicted"
     assert status("bunny", "fineRaster", "time") == "predicted"
+
+
+STAGES = {
+    "triangleSetup": TriangleSetupEvent,
+    "binRaster": BinRasterEvent,
+    "coarseRaster": CoarseRasterEvent,
+    "fineRaster": FineRasterEvent,
+}
+
+
+@pytest.mark.parametrize("kernel", STAGES)
+def test_blocks_belong_to_events_that_the_stage_counts(kernel):
+    named = set(LANES[kernel]) | set(LANES[kernel].values()) | set(FITTED[kernel])
+    assert set(RUNS[kernel]) | set(CHAINS[kernel]) | named <= set(STAGES[kernel].__members__)
+
+
+def test_a_run_by_sixteen_warps_counts_sixteen_times_and_a_class_that_the_stage_counts_not_at_all():
+    blocks = {0: code("FADD R0, R0, R1", "LDG.E R2, [R4]"), 32: code("STS [R0], R1")}
+    total, lanes = instructions((Run((0,), 16), Run((32,), lanes=8)), blocks, {"load"})
+    assert total == {"fp32": 16, "shared": 1}
+    assert lanes == pytest.approx((16 * 32 + 8) / 17)
+
+
+def test_a_chain_counts_a_load_once_where_its_value_is_awaited_and_not_where_nobody_waits():
+    load = Instruction(0, "LDG.E R0, [R2]", 2, 0, 0)
+    use = Instruction(16, "FADD R4, R0, R0", 4, 7, 1)
+    free = Instruction(16, "FADD R4, R6, R6", 4, 7, 0)
+    assert chain((Run((0,)),), {0: [load, use]}, 1.0)["chain_load"] == 1
+    assert "chain_load" not in chain((Run((0,)),), {0: [load, free]}, 1.0)
+
+
+def test_a_cost_is_found_again_from_the_scenes_that_are_left():
+    rows = [
+        {"instructions": 1000.0 + 7 * n, "ours": 1000.0 + FITTED["coarseRaster"]["ROUNDS"][0] * n, "counts": counts}
+        for n, counts in ((10, np.array([10.0, 0.0])), (90, np.array([90.0, 0.0])))
+    ]
+    assert _refit("coarseRaster", rows)[0] == pytest.approx(7)
+
+
+def test_each_thread_of_a_block_stores_its_copy_of_the_parameters():
+    table = np.zeros((3, len(BinRasterEvent)), np.int64)
+    copied = with_parameter_copy(Work("bin_raster", "binRaster", BinRasterEvent, table, 2, 512))
+    assert copied.table[:, BinRasterEvent.STORE_BYTES].tolist() == [664 * 512, 664 * 512, 0]
+    assert copied.streams[-1].bytes == 2 * 664 * 512

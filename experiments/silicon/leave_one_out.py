@@ -63,7 +63,7 @@ def _rows(machine: Machine, say: Callable[[str], None]) -> Iterator[dict[str, An
         measured = read(folder() / name)
         mix = load_mix("cudaraster" if name == CUDARASTER else "freepipe", machine.compute_capability)
         for key, work in works(folder(), machine, say, widest):
-            if (*key, INSTRUCTIONS) in measured and (*key, TIME_METRIC) in measured:
+            if key[4] in FITTED and (*key, INSTRUCTIONS) in measured and (*key, TIME_METRIC) in measured:
                 launch = mix.launch(work, machine.sm.warp_size)
                 yield {
                     "scene": key[0],
