@@ -162,7 +162,7 @@ def as_stamps(scene: Scene) -> NDArray[np.bool_]:
 PIPELINES: dict[str, Callable[[Scene], NDArray[np.bool_]]] = {
     "cudaraster 1.1": by_pipeline("cudaraster", cull_backfaces=False),
     "cudaraster of nvdiffrast": by_pipeline("cudaraster", release="nvdiffrast"),
-    "freepipe": by_pipeline("freepipe"),
+    "freepipe": by_pipeline("freepipe", counting=False),
     "hardware": by_pipeline("hardware", cull_backfaces=False),
     "tiled, per-primitive": as_tiled,
     "binned": as_binned,

@@ -102,8 +102,8 @@ def _notes(table: pd.DataFrame) -> list[str]:
     at = table[table.distance == TOLD].set_index("format").breaks
     more = at["hardware, 24 bits"] / at["hardware, 32 bits"], at["hardware, 24 bits"] / at["hardware, float32"]
     differ = (
-        f"At distance {TOLD:g}, 32 bits of fixed point need {1 / more[0]:.2g} and float32 {1 / more[1]:.2g} of the"
-        f" separation of 24 bits: depths come from float32 vertices and planes, whatever they are stored in."
+        f"At distance {TOLD:g}, walls in 32 bits of fixed point must be {1 / more[0]:.2g} times as far apart as in 24"
+        f" bits, in float32 {1 / more[1]:.2g} times: vertices and planes are float32, whatever depth is stored in."
     )
     narrow, wide = (_run(f"hardware, {bits} bits", TOLD, 1.0, NEAR, nearer_first=False) for bits in (16, 32))
     costs = (
