@@ -40,6 +40,7 @@ class Sampler:
     pipeline: str
     machine: Machine
     executed: dict[str, tuple[int, int]] = field(default_factory=dict)  # units run, and all, by kernel
+    stages: int = 0  # so far
     seconds_saved: float = 0.0  # CPU seconds of the stages sampled, had all units cost alike by size
 
     def stage(
@@ -71,7 +72,7 @@ class Sampler:
         Work
             With a row for every unit, and the ``sample``.
         """
-        strata = make_strata(size, [self.seed, len(self.executed) if key is None else key], *more)
+        strata = make_strata(size, [self.seed, self.stages if key is None else key], *more)
         taken = pilot(strata)
         begin = time.process_time()
         work = execute(drawn(strata, taken))
@@ -85,7 +86,9 @@ class Sampler:
         size = strata.known[:, 1]
         ran, all_sizes = size[drawn(strata, sample.taken)].sum(), size.sum()
         self.seconds_saved += spent * (all_sizes / ran - 1) if ran else 0.0
-        self.executed[work.kernel] = (int(sample.taken.sum()), len(strata.order))
+        ran_before, all_before = self.executed.get(work.kernel, (0, 0))
+        self.executed[work.kernel] = ran_before + int(sample.taken.sum()), all_before + len(strata.order)
+        self.stages += 1
         table = expanded(sample)
         grid = len(table) if work.dispatch == "blocks" else work.grid
         return replace(work, table=table, grid=grid, streams=streams(table), sample=sample)

@@ -11,6 +11,7 @@ Everything here is a pure function of sizes, rows and a seed.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -85,9 +86,15 @@ class Strata:
         """Units of each stratum."""
         return np.diff(self.first)
 
-    def sums(self, values: Floats) -> Floats:
-        """Sums by stratum of values in ``order``."""
-        return np.array([part.sum() for part in np.split(values, self.first[1:-1])])
+    @cached_property
+    def ordered(self) -> Floats:
+        """What is known of the units in ``order``."""
+        return self.known[self.order]
+
+    @cached_property
+    def sizes(self) -> Floats:
+        """Sizes of all units of each stratum together."""
+        return np.array([part.sum() for part in np.split(self.ordered[:, 1], self.first[1:-1])])
 
 
 @dataclass(frozen=True)
@@ -160,7 +167,7 @@ def _cuts(size: Floats) -> Integers:
 
 def pilot(strata: Strata) -> Integers:
     """Units that the first sample takes of each stratum."""
-    total = strata.sums(strata.known[strata.order, 1])
+    total = strata.sizes
     share = total / max(total[1:].sum(), 1e-300)
     taken: Integers = np.minimum(strata.units, np.maximum(PILOT_EACH, np.ceil(PILOT * share))).astype(np.int64)
     taken[0] = strata.units[0]
@@ -182,7 +189,7 @@ def _places(strata: Strata, taken: Integers) -> Integers:
 class _Fit:
     """What rows are predicted to be, and how far they are from it."""
 
-    predicted: Floats  # (units, k) of all units, in ``order``, by what is known of them
+    factors: Floats  # (p, k): rows are predicted as what is known times these
     residual: Floats  # (units that ran, k) less the prediction
     mean: Floats  # (strata, k) of the residuals
     spread: Floats  # (strata, k) their variance
@@ -192,18 +199,16 @@ class _Fit:
 
 def _fit(sample: Sample, values: Floats) -> _Fit:
     strata, taken = sample.strata, sample.taken
-    known = strata.known[strata.order]
-    ran = _places(strata, taken)
-    factors, freedom = _factors(sample, known[ran], values)
-    predicted = known @ factors
-    residual = values - predicted[ran]
+    known = strata.ordered[_places(strata, taken)]
+    factors, freedom = _factors(sample, known, values)
+    residual = values - known @ factors
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
     some = np.maximum(taken, 1)[:, None]
     mean = _reduce(residual, starts, taken) / some
     squares = _reduce((residual - np.repeat(mean, taken, axis=0)) ** 2, starts, taken)
     spread = squares / np.maximum(taken - 1, 1)[:, None] * freedom
     weight = strata.units * (strata.units - taken) / some[:, 0]
-    return _Fit(predicted, residual, mean, spread, weight, taken)
+    return _Fit(factors, residual, mean, spread, weight, taken)
 
 
 def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, float]:
@@ -212,11 +217,10 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, flo
     n, p = len(values) - first, known.shape[1]
     if n < ENOUGH * p:
         return np.zeros((p, values.shape[1])), 1.0
-    weight = np.sqrt(
-        np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
-    )
-    factors = np.linalg.lstsq(known[first:] * weight[:, None], values[first:] * weight[:, None], rcond=None)[0]
-    return factors.astype(np.float64), n / (n - p)
+    weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
+    weighted = (known[first:] * weight[:, None]).T
+    factors: Floats = np.linalg.pinv(weighted @ known[first:], hermitian=True) @ (weighted @ values[first:])
+    return factors, n / (n - p)
 
 
 def _reduce(values: Floats, starts: Integers, taken: Integers) -> Floats:
@@ -239,7 +243,7 @@ def totals(sample: Sample, values: Floats) -> Totals:
     """
     fit = _fit(sample, values)
     units, first = sample.strata.units, int(sample.taken[0])
-    rest = fit.predicted[first:].sum(axis=0) + (units[1:, None] * fit.mean[1:]).sum(axis=0)
+    rest = sample.strata.ordered[first:].sum(axis=0) @ fit.factors + (units[1:, None] * fit.mean[1:]).sum(axis=0)
     value = values[:first].sum(axis=0) + rest
     part = fit.weight[:, None] * _smoothed(sample, fit)
     variance = part.sum(axis=0)
@@ -274,7 +278,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
 def _smoothed(sample: Sample, fit: _Fit) -> Floats:
     """Residual variances, small samples' drawn towards what is usual: in proportion to size, or not, if less."""
     strata = sample.strata
-    size = strata.sums(strata.known[strata.order, 1])
+    size = strata.sizes
     square = ((size / np.maximum(strata.units, 1) + 0.1) ** 2)[:, None]
     freedom = np.where(sample.taken < strata.units, np.maximum(sample.taken - 1, 0), 0)[:, None]
     share = freedom / max(freedom.sum(), 1)
@@ -295,7 +299,7 @@ def expanded(sample: Sample) -> Integers:
     table[drawn(strata, taken)] = np.rint(sample.rows)
     if ran.all():
         return table
-    rows = fit.predicted[~ran] + np.repeat(fit.mean, strata.units - taken, axis=0)
+    rows = strata.ordered[~ran] @ fit.factors + np.repeat(fit.mean, strata.units - taken, axis=0)
     np.maximum(rows, 0.0, out=rows)
     sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
     rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)

@@ -1,6 +1,8 @@
 """CudaRaster where numbers are wanted within an error: part of the tiles are drawn, and no picture."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
 from simulator.stages.laine2011.fine_raster import MODES, WARP_LINES, WARPS, count_starts, fine_raster, fine_streams
 from simulator.stages.laine2011.sampled_tiles import tile_areas
-from simulator.stages.laine2011.triangle_setup import triangle_setup
+from simulator.stages.laine2011.triangle_setup import BLOCK, MAX_SUBTRIANGLES, triangle_setup
 from simulator.work import Work
 
 
@@ -25,7 +27,7 @@ def sampled_draw(
     simt: Simt,
     options: dict[str, Any],
 ) -> list[Work]:
-    """One draw: the first three stages, and fine raster on part of the tiles by the length of their lists.
+    """One draw: all triangles set up, binned and listed; counted in part of the blocks, and drawn in part of the tiles.
 
     Parameters
     ----------
@@ -42,27 +44,43 @@ def sampled_draw(
     release, samples, mode = options["release"], options["samples"], options["mode"]
     depth, _, _, interpolate = MODES[mode]
     shape: dict[str, Any] = {"width": width, "height": height, "simt": simt, "release": release}
-    setup, setup_work, _ = triangle_setup(
-        positions, triangles, **shape, samples=samples, cull_backfaces=options["cull_backfaces"],
-        depth=depth, interpolate=interpolate, capacity=2**31,
+    prepare: Callable[..., Any] = partial(
+        triangle_setup, positions, **shape, samples=samples, cull_backfaces=options["cull_backfaces"],
+        depth=depth, interpolate=interpolate, capacity=MAX_SUBTRIANGLES,
     )  # fmt: skip
+    setup, all_of_it, _ = prepare(triangles, counting=False)
+    visible = np.add.reduceat(setup.subtriangles > 0, np.arange(0, len(triangles), BLOCK), dtype=np.int64)
+    setup_work = sample.stage(visible, partial(_count_setup, prepare, triangles, mode), lambda _: all_of_it.streams)
     queues, bin_work, _ = bins.bin_raster(setup, **shape)
     lists, tile_work, _ = tiles.coarse_raster(queues, setup, deferred_clear=True, **shape)
+    variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
     area = tile_areas(setup, lists, width, height)
     fine_work = sample.stage(
         np.diff(lists.starts)[lists.active],
-        lambda units: fine_raster(
-            setup, lists.starts, lists.entries, lists.active[units], **shape, samples=samples, mode=mode,
-            starts=False,
-        )[1],
+        lambda units: replace(
+            fine_raster(
+                setup, lists.starts, lists.entries, lists.active[units], **shape, samples=samples, mode=mode,
+                starts=False,
+            )[1],
+            variant=variant,
+        ),
         lambda table: fine_streams(_started(table, simt), setup, len(lists.entries), width, height, samples),
         (area[lists.active],),
     )  # fmt: skip
-    variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
-    return [replace(setup_work, variant=mode), bin_work, tile_work, replace(fine_work, variant=variant)]
+    return [setup_work, bin_work, tile_work, fine_work]
 
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:
     """Add to the rows of all tiles what the warps do besides; in place."""
     count_starts(table, WARPS * simt.sms, 128 if simt.coalescing == WARP_LINES else 32)
     return table
+
+
+def _count_setup(
+    prepare: Callable[..., Any], triangles: NDArray[np.int32], mode: str, units: NDArray[np.int64]
+) -> Work:
+    """Blocks ``units`` of triangle setup, one after another: what a block does does not hang on those before it."""
+    order = np.argsort(units)  # a block that is not full comes last
+    some = (units[order, None] * BLOCK + np.arange(BLOCK)).ravel()
+    work: Work = prepare(triangles[some[some < len(triangles)]])[1]
+    return replace(work, table=work.table[np.argsort(order)], variant=mode)

@@ -160,7 +160,7 @@ def _buckets(
         work = bucket_write(boxes, tiles, count, start, idx, simt)[1][0]
         return replace(work, table=work.table[np.argsort(order)])
 
-    key = len(sample.executed)
+    key = sample.stages
     counted = sample.stage(met, calculate, key=key)
     requests = _requests(counted, count)
     exact = address_work(patches, tiles, counted.table, requests, aggregate=False)

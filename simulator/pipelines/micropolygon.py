@@ -96,8 +96,9 @@ def micropolygon(
     tiles = screen_tiles(width, height, tile, bound)
     boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid else None
     subpatches, split = bound_and_split(
-        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, wanted=boxes
-    )
+        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, wanted=boxes,
+        sample=sample,
+    )  # fmt: skip
     if sample and boxes and len(subpatches.patch):
         options = {"spp": spp, "box_tests": box_tests, "edges": edges}
         view = matrix, width, height, simt

@@ -24,10 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
+from simulator.sampler import Sampler
 from simulator.stages.eisenacher2010.bezier import LANES, screen_points
 from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
-from simulator.stages.eisenacher2010.split_counts import oracle_work, scan_works, subdivide_work, transform_work
+from simulator.stages.eisenacher2010.split_counts import pass_works, scan_works, transform_work
 from simulator.work import Work
 
 BLOCK = 256  # threads, a sub-patch each
@@ -91,6 +92,7 @@ def bound_and_split(
     min_depth: int = 0,
     max_depth: int = MAX_DEPTH,
     wanted: list[NDArray[np.float32]] | None = None,
+    sample: Sampler | None = None,
 ) -> tuple[SubPatches, list[Work]]:
     """Subdivide patches until their sub-patches are small on screen.
 
@@ -118,6 +120,8 @@ def bound_and_split(
         counted in ``SubPatches.passes``.
     wanted : list, optional
         Is given (N, 5) float32: box x0, y0, x1, y1 in pixels of each sub-patch's control points, and its area.
+    sample : Sampler, optional
+        Count long passes in part of their blocks.
 
     Returns
     -------
@@ -149,11 +153,12 @@ def bound_and_split(
         culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
         passes.append([len(path), culled, kept, across + split, given_up])
         if counting:
-            works += [oracle_work(queue.patch, path, simt), *scan_works(scan)]
+            oracle, subdivision = pass_works(queue.patch, path, places, simt, sample)
+            works += [oracle(), *scan_works(scan)]
         if kept == len(path):
             break
         if counting:
-            works.append(subdivide_work(path, places, simt))
+            works.append(subdivision())
         queue, path, boxes = _next_queue(queue, path, boxes, places, int(slots.sum()), bound)
         if across + split == 0:
             break

@@ -4,8 +4,10 @@ The shape of the kernels is ours where the paper is silent: 256 threads a block,
 8 bytes (patch index; level, i and j packed); 16 loads of 16 bytes for the control points; storage wishes of 4 bytes.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from enum import IntEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +18,11 @@ from models.coalescing import contiguous, transactions
 from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
+from simulator.sampler import Sampler
 from simulator.work import Work
 
 STAGE = "bound_and_split"
+SAMPLED_QUEUE = 2**17  # sub-patches of a pass from which on a sampler counts part of its blocks
 BLOCK = 256  # threads
 ENTRY_BYTES = 8
 POINT_BYTES = 16  # a homogeneous control point
@@ -198,16 +202,18 @@ def oracle_work(patch: NDArray[np.int32], path: NDArray[np.uint8], simt: Simt) -
     """
     table = np.zeros((_blocks(len(path)), len(_O)), np.int64)
     for_parts(_count_blocks, parts_of(len(table)), patch, path, None, simt.warp, int(simt.coalescing), table)
+    return _work("oracle", _O, table, *oracle_streams(table, patch))
+
+
+def oracle_streams(table: NDArray[np.int64], patch: NDArray[np.int32]) -> tuple[Stream, ...]:
+    """Buffers of one pass of the oracle, from the rows of all its blocks."""
     total = table.sum(axis=0)
-    entries = len(path) * ENTRY_BYTES
+    entries = len(patch) * ENTRY_BYTES
     distinct = 1 + int(np.count_nonzero(np.diff(patch))) if len(patch) else 0
-    return _work(
-        "oracle",
-        _O,
-        table,
+    return (
         Stream("queue", "load", entries, entries),
         Stream("clip_points", "load", int(total[_O.LOAD_BYTES]) - entries, distinct * POINTS * POINT_BYTES),
-        Stream("slots", "store", int(total[_O.STORE_BYTES]), len(path) * WORD_BYTES),
+        Stream("slots", "store", int(total[_O.STORE_BYTES]), len(patch) * WORD_BYTES),
     )
 
 
@@ -235,15 +241,55 @@ def subdivide_work(path: NDArray[np.uint8], places: NDArray[np.uint32], simt: Si
     """
     table = np.zeros((_blocks(len(path)), len(_S)), np.int64)
     for_parts(_count_blocks, parts_of(len(table)), path, path, places, simt.warp, int(simt.coalescing), table)
+    return _work("subdivide", _S, table, *subdivide_streams(table, len(path)))
+
+
+def subdivide_streams(table: NDArray[np.int64], length: int) -> tuple[Stream, ...]:
+    """Buffers of one pass of the subdivision of a queue, from the rows of all its blocks."""
     total = table.sum(axis=0)
-    loads = len(path) * (ENTRY_BYTES + 2 * WORD_BYTES)
+    loads = length * (ENTRY_BYTES + 2 * WORD_BYTES)
     written = int(total[_S.KEEP_LANES] + 4 * total[_S.SPLIT_LANES]) * ENTRY_BYTES
-    return _work(
-        "subdivide",
-        _S,
-        table,
-        Stream("queue", "load", len(path) * ENTRY_BYTES, len(path) * ENTRY_BYTES),
-        Stream("slots", "load", len(path) * WORD_BYTES, len(path) * WORD_BYTES),
-        Stream("places", "load", int(total[_S.LOAD_BYTES]) - loads + len(path) * WORD_BYTES, len(path) * WORD_BYTES),
+    return (
+        Stream("queue", "load", length * ENTRY_BYTES, length * ENTRY_BYTES),
+        Stream("slots", "load", length * WORD_BYTES, length * WORD_BYTES),
+        Stream("places", "load", int(total[_S.LOAD_BYTES]) - loads + length * WORD_BYTES, length * WORD_BYTES),
         Stream("queue", "store", int(total[_S.STORE_BYTES]), written),
     )
+
+
+def pass_works(
+    patch: NDArray[np.int32],
+    path: NDArray[np.uint8],
+    places: NDArray[np.uint32],
+    simt: Simt,
+    sample: Sampler | None,
+) -> tuple[Callable[[], Work], Callable[[], Work]]:
+    """Count one pass of oracle and subdivision when asked to; with a sampler, a long one in part of its blocks."""
+    if sample is None or len(path) < SAMPLED_QUEUE:
+        return partial(oracle_work, patch, path, simt), partial(subdivide_work, path, places, simt)
+    first = np.arange(0, len(path), BLOCK)
+    kept = np.add.reduceat(path == _KEEP, first, dtype=np.int64)
+    split = np.add.reduceat(path >= _ACROSS, first, dtype=np.int64)
+
+    def some(make: Callable[..., Work], *arrays: NDArray[Any]) -> Callable[[NDArray[np.int64]], Work]:
+        """Blocks one after another: their rows hang on nothing before them."""
+
+        def execute(units: NDArray[np.int64]) -> Work:
+            order = np.argsort(units)  # a block that is not full comes last
+            entries = (units[order, None] * BLOCK + np.arange(BLOCK)).ravel()
+            entries = entries[entries < len(path)]
+            work = make(*(array[entries] for array in arrays), simt)
+            return replace(work, table=work.table[np.argsort(order)])
+
+        return execute
+
+    ones = np.ones(len(first))
+    return (
+        partial(
+            sample.stage, ones, some(oracle_work, patch, path), lambda t: oracle_streams(t, patch), (kept, split)
+        ),
+        partial(
+            sample.stage, ones, some(subdivide_work, path, places), lambda t: subdivide_streams(t, len(path)),
+            (kept, split),
+        ),
+    )  # fmt: skip
