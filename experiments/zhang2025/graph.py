@@ -101,7 +101,7 @@ def run(progress: Callable[[str], None]) -> Result:
         (
             f"Fitted, the only constant: {gap:.0f} us from the end of a call to the start of one that waits for it, on "
             f"the stream ({len(frame) + 1} calls) as in the graph ({len(graph.path)} on the path). It is far above the "
-            f"{machine.launch.stream_us} us measured on Linux; Windows hands calls to the GPU in batches."
+            f"{machine.launch.stream_us} us measured on Linux; presumably Windows hands calls over in batches."
         ),
         f"Assumed: mapping and unmapping the window's buffer costs {MAPPING_CALLS} such gaps.",
     ]

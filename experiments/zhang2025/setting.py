@@ -21,7 +21,7 @@ from simulator.simulation import simulate
 
 WIDTH, HEIGHT = 1920, 1080
 CANDIDATES = ("ga104", "rtx3080")
-BASE_MHZ = {"ga104": 1110.0, "rtx3080": 1440.0}  # data sheets: RTX 3080 Laptop (115 W), RTX 3080
+BASE_MHZ = {"ga104": 1110.0, "rtx3080": 1440.0}  # RTX 3080 Laptop (115 W), RTX 3080: from memory, not looked up
 SOURCE = "Zhang 2025, README and Nsight Compute tables (1920x1080, 5,000 triangles; GPU not named)"
 FOLDER = Path(__file__).parent
 TEXTURE = 1024  # texels on a side
@@ -80,7 +80,7 @@ def profiled(name: str) -> Machine:
         "latency.dram_cycles": latency.l2_cycles + share * (latency.dram_cycles - latency.l2_cycles),
         "launch.blocks_per_us": share * machine.launch.blocks_per_us,
     }
-    return altered(machine, numbers, "published", "base clock of the data sheet, which Nsight Compute locks to")
+    return altered(machine, numbers, "assumed", "base clock, which Nsight Compute locks to, from memory")
 
 
 def draw(scene: Scene, machine: str, **options: object) -> Run:
