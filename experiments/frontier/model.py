@@ -34,7 +34,7 @@ FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "auto": A
 RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
 SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
 EXECUTED = "ours, all units executed"
-REPEATS = 3  # of pricing, which takes milliseconds
+REPEATS = 2  # of pricing, which takes milliseconds
 
 
 @dataclass(frozen=True)
