@@ -63,7 +63,7 @@ def _notes() -> list[str]:
     return [
         (
             "No cell is fitted. Instructions and chains are read from machine code compiled for 8.6 from kernels like "
-            "his, which give his register counts (two within three, one two more); caches and latencies of both "
+            "his, which give his register counts (six of nine, three two or three more); caches and latencies of both "
             "machines are assumed; the rates of stores and of blocks and a block's start are as measured on an H200, "
             "and of these, stores are not held up in L2 as they were there, which the published times before "
             "optimization exclude. Each kernel is "
