@@ -206,6 +206,7 @@ def _beside(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> "pd.DataFrame":
         "others, error and speed published" if mark == "published" else "others, speed derived"
         for mark in drawn.speed_mark
     ]
-    others = {"name": drawn.name, "group": group, "cost": drawn.seconds, "error": drawn.error_percent}
+    names = drawn.name.where(drawn.error_against.str.startswith("silicon"), drawn.name + " (not against silicon)")
+    others = {"name": names, "group": group, "cost": drawn.seconds, "error": drawn.error_percent}
     points = pd.concat([_points(ours, "error_against_known"), pd.DataFrame({**others, "published": True})])
     return points.assign(front=pareto_front(points.cost, points.error))

@@ -50,9 +50,9 @@ def _about_auto(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
     shares = [share.split(" of ") for share in table[table.method == AUTO].played]
     played, launches = (sum(int(share[i]) for share in shares) for i in (0, 1))
     return (
-        f"Auto was asked for {ERROR:.0%}. It left {launches - played} of {launches} launches at their roofline, proved near "
-        f"enough or too small to matter, and played the other {played}; it prices a frame in {auto.pricing_seconds * 1e3:.0f} ms and is "
-        f"{_off(auto)}."
+        f"Auto was asked for {ERROR:.0%}. It left {launches - played} of {launches} launches at their roofline, proved "
+        f"near enough or too small to matter, and played the other {played}; it prices a frame in "
+        f"{auto.pricing_seconds * 1e3:.0f} ms and is {_off(auto)}."
     )
 
 
@@ -79,11 +79,14 @@ def _about_others(ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.Data
     return [
         (
             f"Against published and measured times the full run is {100 * full.error_against_known:.1f} % off in the "
-            f"mean; none of these times was fitted. Detailed simulators by others would take "
-            f"{_span(drawn.seconds.min())} to {_span(drawn.seconds.max())} for the mean frame: its warp instructions over their "
-            f"speed, which {direct} of them publish and {len(drawn) - direct} give as a ratio to another. Their "
-            f"errors are the ones they report, each on its own workloads and machine, so the heights are not of one race; only the "
-            f"seconds are of one frame."
+            f"mean. None of these times was fitted, but mixes were on other frames of the same systems, so they are easy "
+            f"ones; the tables of this page have the rest."
+        ),
+        (
+            f"Detailed simulators by others would take {_span(drawn.seconds.min())} to {_span(drawn.seconds.max())} for "
+            f"the mean frame: its warp instructions over their speed, which {direct} of them publish and "
+            f"{len(drawn) - direct} give as a ratio to another. Their errors are the ones they report, each on its own "
+            f"workloads and machine, so the heights are not of one race; only the seconds are of one frame."
         ),
         f"{len(silent)} more report an error but no speed that was found: {'; '.join(silent.name)}.",
         f"On the front of the second chart: {'; '.join(front.name)}.",
