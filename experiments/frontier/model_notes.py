@@ -79,12 +79,12 @@ def _about_others(ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.Data
     return [
         (
             f"Against published and measured times the full run is {100 * full.error_against_known:.1f} % off in the "
-            f"mean. None of these times was fitted, but mixes were on other frames of the same systems, so they are easy "
-            f"ones; the tables of this page have the rest."
+            f"mean. None of these times was fitted, but mixes were on other frames of the same systems, so they are "
+            f"easy ones; the tables of this page have the rest."
         ),
         (
-            f"Detailed simulators by others would take {_span(drawn.seconds.min())} to {_span(drawn.seconds.max())} for "
-            f"the mean frame: its warp instructions over their speed, which {direct} of them publish and "
+            f"Detailed simulators by others would take {_span(drawn.seconds.min())} to {_span(drawn.seconds.max())} "
+            f"for the mean frame: its warp instructions over their speed, which {direct} of them publish and "
             f"{len(drawn) - direct} give as a ratio to another. Their errors are the ones they report, each on its own "
             f"workloads and machine, so the heights are not of one race; only the seconds are of one frame."
         ),
