@@ -36,7 +36,7 @@ OWN_LOADS = {  # loads that the stages do not count
 FITTED: dict[str, dict[str, tuple[float, float]]] = {
     "triangleSetup": {"CLIP_WARPS": (372.7, 0.0), "SITE_WARPS": (4.77, 0.0), "FAST_WARPS": (2.09, 0.0)},
     "binRaster": {"SLOW_WARPS": (15.52, 0.0), "ROW_ENDS": (7.45, 0.0), "WALK_STEPS": (1.68, 0.0)},
-    "coarseRaster": {"ROUNDS": (99.83, 0.0), "CASE_C_STEPS": (5.92, 0.0)},
+    "coarseRaster": {"ROUNDS": (264.7, 0.0), "CASE_C_STEPS": (7.8, 7.0)},
     "fineRaster": {
         "WARP_STARTS": (536.75, 19.6),
         "FRAGMENT_ROUNDS": (4.98, 26.4),

@@ -24,7 +24,7 @@ from models.traffic import traffic
 from simulator.mix import load_mix
 from simulator.pipelines import load_pipeline
 from simulator.scenes import load_scene
-from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
+from simulator.stages.laine2011.parameter_copy import COPYING, VARIANT, with_parameter_copy
 from simulator.work import Work
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _rows(
                 error = ours - theirs if quantity.absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
                 yield about | _entry(quantity.name, ours, theirs, error, quantity.aim)
         cold = traffic([launch], machine)[0]
-        for moved in MOVED:
+        for moved in () if key[4].endswith(VARIANT) else MOVED:  # counters of local memory were not read
             theirs = sum(w * measured.get((*key, metric), 0.0) for metric, w in moved.metrics)
             if (*key, moved.metrics[0][0]) in measured and theirs > 0:
                 ours = moved.ours(launch, cold)
