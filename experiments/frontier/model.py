@@ -158,7 +158,7 @@ def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
     ]
     for row in theirs[theirs.seconds.notna()].to_dict("records"):
         speed = str(row["speed_mark"]).partition(":")[0]
-        cells.append(Cell(row["name"], f"the same at its {speed} speed", "CPU s", None, row["seconds"], "reported"))
+        cells.append(Cell(row["name"], f"the mean frame at its {speed} speed", "s", None, row["seconds"], "reported"))
     return cells
 
 
@@ -191,7 +191,7 @@ def _draw_published(ours: "pd.DataFrame", theirs: "pd.DataFrame", frames_: int, 
     frontier(
         path,
         _beside(ours, theirs),
-        "time to simulate one frame [CPU s]",
+        "time to simulate one frame [s; ours of CPU, others as published]",
         "mean error of a frame's time against silicon [%]",
         f"Cost of a simulation against its error on published and measured times, mean of {frames_} frames",
     )
