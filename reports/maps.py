@@ -11,7 +11,7 @@ from reports.style import HEAT, figure
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = 3  # panels side by side
+COLUMNS = 3  # panels side by side, at most
 
 
 def value_maps(
@@ -38,10 +38,10 @@ def value_maps(
     log_x, log_y : bool
         Where the values of an axis grow by a factor.
     top : float
-        Value of the brightest colour.
+        Value from which the colour is the brightest.
     """
-    columns = min(COLUMNS, len(maps))
-    rows = -(-len(maps) // columns)
+    rows = -(-len(maps) // COLUMNS)
+    columns = -(-len(maps) // rows)
     size = (5.2 * columns, 3.2 * rows + 0.6)
     with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, (name, table) in zip(grid.flat, maps.items(), strict=False):
@@ -49,7 +49,7 @@ def value_maps(
             image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
             axes.grid(visible=False)
             axes.set(title=name, xlabel=x_label, ylabel=y_label)
-            axes.figure.colorbar(image, ax=axes, label=unit)
+            axes.figure.colorbar(image, ax=axes, label=unit, extend="neither" if top >= 1 else "max")
             axes.set_xscale("log" if log_x else "linear")
             axes.set_yscale("log" if log_y else "linear")
             _name(axes.xaxis, table.columns, rotation=60)

@@ -134,3 +134,17 @@ def test_walls_at_distance_100_fight_below_this_separation(name, holds, breaks):
 def test_the_small_kernels_of_the_atlas_agree_with_exact_coverage_on_fat_triangles(cover):
     points = methods.quantized([[[3.2, 4.1], [50.7, 9.3], [20.4, 55.6]], [[60.3, 2.2], [61.9, 40.8], [40.1, 33.7]]])
     assert (cover(points, 64).mask == methods.exact(points, 64).mask).all()
+
+
+@pytest.mark.parametrize(
+    ("cover", "pipeline", "options"),
+    [
+        (methods.barycentrics, "tiled", {"cull_backfaces": False}),
+        (methods.barycentrics, "per-primitive", {}),
+        (methods.edge_planes, "binned", {"cull_backfaces": False}),
+    ],
+)
+def test_the_small_kernels_of_the_atlas_cover_what_their_pipelines_cover(cover, pipeline, options):
+    points = shared_edges.triangles_of(shared_edges.lattice(0.0))[:40] / 2 + [0.0, 3e-5]
+    run = methods.draw(methods.flat_scene(points, 64), pipeline, 64, **options)
+    assert ((run.triangle_ids[::-1] >= 0) == cover(points, 64).mask).all()

@@ -27,6 +27,7 @@ from simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon,
 
 SIZE = 64  # pixels
 WRONG = 0.01  # share of the screen from which we say that it breaks
+BRIGHTEST = 0.1  # share of wrong pixels in the map
 TURN = np.radians(25.0)
 TWO_TRIANGLES = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
 Corners = NDArray[np.float64]  # (4, 4) clip positions of (0, 0), (1, 0), (0, 1), (1, 1)
@@ -223,6 +224,5 @@ def _plot(table: pd.DataFrame, path: Any) -> None:
         grid = group.pivot_table(index="pipeline", columns="value", values="wrong", sort=False)
         grid.columns = pd.Index([f"{value:.3g}" for value in grid.columns])
         maps[f"{title}: {case.parameter} {case.unit and f'[{case.unit}]'}"] = grid
-    value_maps(
-        maps, path, title="Who clips, who drops, who breaks", unit="wrong pixels / pixels", x_label="", y_label=""
-    )
+    title, unit = "Who clips, who drops, who breaks", "wrong pixels / pixels"
+    value_maps(maps, path, title=title, unit=unit, x_label="", y_label="", top=BRIGHTEST)
