@@ -12,7 +12,7 @@ from reports.style import PALETTE, figure
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = 3
+COLUMNS = 4
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "black", "linewidth": 0.9},
     {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
@@ -39,7 +39,7 @@ def panels(
     Parameters
     ----------
     table : DataFrame
-        A row a point; an error of zero is drawn at the foot of its panel.
+        A row a point; an error of zero is drawn at the foot of a logarithmic panel.
     path : Path
         PNG to write.
     panel, group, x, y, front, second : str
@@ -47,8 +47,8 @@ def panels(
     """
     names = list(dict.fromkeys(table[panel]))
     groups = list(dict.fromkeys(table[group]))
-    rows = -(-len(names) // COLUMNS)
-    size = (4.1 * COLUMNS, 3.3 * rows + 0.9)
+    rows = -(-(len(names) + 1) // COLUMNS)  # the legend has a place of its own
+    size = (3.5 * COLUMNS, 3.1 * rows + 0.4)
     with figure(path, title, nrows=rows, ncols=COLUMNS, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
             _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, (front, second))
@@ -56,21 +56,18 @@ def panels(
             axes.set_axis_off()
         for axes in grid[:, 0]:
             axes.set_ylabel(y_label, fontsize=8)
-        for column in range(min(COLUMNS, len(names))):
-            last = grid[(len(names) - 1 - column) // COLUMNS, column]
-            last.set_xlabel(x_label, fontsize=8)
-        handles = [_mark(k) for k in range(len(groups))]
-        grid[0, 0].figure.legend(
-            [*handles, *map(_line, LINES)], [*groups, "front", "front of software"], fontsize=8,
-            loc="upper right", ncols=min(len(groups) + 2, 7), bbox_to_anchor=(1.0, 1.0 - 0.28 / size[1]),
-        )  # fmt: skip
+        for axes in grid.flat[max(len(names) - COLUMNS, 0) : len(names)]:
+            axes.set_xlabel(x_label, fontsize=8)
+        handles = [*(_mark(k) for k in range(len(groups))), *map(_line, LINES)]
+        grid.flat[len(names)].legend(handles, [*groups, "front", "front of software"], fontsize=8, loc="upper left")
 
 
 def _panel(
     axes: Any, rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, fronts: tuple[str, str]
 ) -> None:
+    linear = rows[y].max() < 10.0 * max(rows[y].min(), 1e-9)  # less than a decade: from zero
     positive = rows[y][rows[y] > 0]
-    foot = 10.0 ** np.floor(np.log10(positive.min()) - 0.3) if len(positive) else 1e-6
+    foot = 0.0 if linear or not len(positive) else 10.0 ** np.floor(np.log10(positive.min()) - 0.3)
     heights = rows[y].where(rows[y] > 0, foot)
     for index, key in enumerate(groups):
         mine = rows[group] == key
@@ -78,11 +75,24 @@ def _panel(
     for front, line in zip(fronts, LINES, strict=True):
         best = rows.assign(height=heights)[rows[front]].sort_values([x, "height"])
         axes.step(best[x], best["height"], where="post", **line)
-    axes.set(xscale="log", yscale="log")
+    axes.set_xscale("log")
+    axes.set_xlim(*_decades(rows[x]))
+    if foot > 0.0:
+        axes.set_yscale("log")
+        axes.set_ylim(foot / 2.0, 2.0 * _decades(heights)[1])
+    else:
+        axes.set_ylim(-0.03 * max(heights.max(), 1e-6), 1.2 * max(heights.max(), 1e-6))
+    axes.minorticks_off()
     axes.set_title(name, fontsize=9)
     axes.tick_params(labelsize=7)
-    if (rows[y] <= 0).any():
+    if (rows[y] <= 0).any() and foot > 0.0:
         axes.annotate("none", (0.01, foot), xycoords=("axes fraction", "data"), fontsize=7, va="bottom")
+
+
+def _decades(values: "pd.Series[float]") -> tuple[float, float]:
+    """Powers of ten around values."""
+    low, high = np.floor(np.log10(values.min() / 1.2)), np.ceil(np.log10(values.max() * 1.2))
+    return float(10.0**low), float(10.0 ** max(high, low + 1))
 
 
 def _style(index: int) -> dict[str, Any]:

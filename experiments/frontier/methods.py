@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.frontier.methods_notes import notes
 from experiments.frontier.methods_scenes import AREAS, AREAS_LONG, Subject, lattice, patches, subjects, textured_subject
-from experiments.frontier.methods_truth import Truth
+from experiments.frontier.methods_truth import QUICK_SIDE, Truth
 from experiments.frontier.methods_variants import (
     ALL_PATCHES,
     ALL_TRIANGLES,
@@ -29,6 +29,7 @@ from experiments.registry import Progress
 from experiments.result import Cell, Figure, Result
 from models.errors import TilestampError
 from reports.methods_plot import panels, side_by_side
+from simulator.reference.picture import SIDE
 from simulator.run import Run
 from simulator.simulation import simulate
 
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SOURCE = (
-    "Truth: our own exact rasterizer (simulator/reference): rational coverage, double precision, 256 samples a pixel "
-    "for the converged picture. Cost: the model's milliseconds"
+    "Truth: our own exact rasterizer (simulator/reference): rational coverage, double precision, 64 samples a "
+    "pixel for the converged picture (256 in the long run). Cost: the model's milliseconds"
 )
 MACHINES = ("h200", "gtx480")  # today's, and one of the papers'
 NO_TIME = float("nan")
@@ -66,7 +67,7 @@ def run(progress: Progress) -> Result:
     worst: dict[str, tuple[float, Drawn]] = {}
     for subject, variants in _grid():
         progress(f"frontier/methods: {subject.name}")
-        truth = Truth(subject)
+        truth = Truth(subject, SIDE if is_long() else QUICK_SIDE)
         for variant in variants:
             drawn = Drawn(subject, variant, _run(subject, variant, MACHINES[0]), truth)
             row = _row(drawn)
@@ -199,8 +200,19 @@ def _front(table: "pd.DataFrame", machine: str, error: str) -> Figure:
     rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
     rows = rows.assign(front=rows[f"front_{error}"], second=rows[f"software_front_{error}"])
     words, title = MEASURES[error]
-    columns = {"panel": "scene", "group": "pipeline", "x": "ms", "y": error, "front": "front", "second": "second"}
-    labels = {"x_label": "modelled time [ms]", "y_label": words, "title": f"{title} against modelled time, {machine}"}
+    columns: dict[str, Any] = {
+        "panel": "scene",
+        "group": "pipeline",
+        "x": "ms",
+        "y": error,
+        "front": "front",
+        "second": "second",
+    }
+    labels: dict[str, Any] = {
+        "x_label": "modelled time [ms]",
+        "y_label": words,
+        "title": f"{title} against modelled time, {machine}",
+    }
     draw = partial(panels, rows, **columns, **labels)
     return Figure(f"{machine}-{error}", draw)
 

@@ -15,6 +15,7 @@ from simulator.reference.coverage import CENTRE, Visible, homogeneous_corners, s
 from simulator.reference.picture import exact_picture
 from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
 from simulator.stages.eisenacher2010.dice import dice
+from simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND
 from simulator.stages.fatahalian2009.micropolygons import micropolygons
 from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
 from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
@@ -23,6 +24,7 @@ MICROPOLYGONS = ("stamps", "across-polygons", "bit-mask")  # white behind, a gre
 FINE_BOUND = 2.0  # pixels of a sub-patch of the reference: its micropolygons are two thirds of a pixel
 FINE_EDGE = 0.7  # pixels of a micropolygon of the reference
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+QUICK_SIDE = 8  # samples along a pixel of the converged picture; a mean of 4e-5 from that of 16 on the sheets
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class Truth:
     """Exact answers for one scene, kept."""
 
     subject: Subject
+    side: int = QUICK_SIDE
     _geometries: dict[str, Geometry] = field(default_factory=dict)
     _seen: dict[tuple[str, tuple[float, float]], Visible] = field(default_factory=dict)
     _pictures: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -81,7 +84,7 @@ class Truth:
                 texture = {"uvs": mesh.uvs[mesh.triangles], "texture": mesh.textures[0]}
             self._pictures[kind] = exact_picture(
                 made.corners, made.depths, made.colors, self.subject.width, self.subject.height,
-                background=made.background, **texture,
+                side=self.side, background=made.background, **texture,
             )  # fmt: skip
         return self._pictures[kind]
 
@@ -150,7 +153,9 @@ def _patches(subject: Subject) -> Geometry:
     vertices = grids.vertices[:, halves].reshape(-1, 3, 4)
     packed = np.ascontiguousarray(vertices[..., 3])
     colors = packed.view(np.uint8).reshape(-1, 3, 4)[..., :3] / 255.0
-    return Geometry(*screen_corners(vertices[..., :3], *size), colors, None, WHITE)
+    behind = np.array([BACKGROUND], np.uint32).view(np.uint8)[:3] / 255.0
+    background = float(behind[0]), float(behind[1]), float(behind[2])
+    return Geometry(*screen_corners(vertices[..., :3], *size), colors, None, background)
 
 
 def _same(grey: NDArray[np.float64]) -> NDArray[np.float64]:

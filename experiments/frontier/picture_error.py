@@ -48,27 +48,21 @@ def pixel_errors(
         See ``homogeneous_corners``.
     """
     wrong = ids != truth.ids
-    shown = nearest_depth(ids, corners, depths)
-    with np.errstate(invalid="ignore"):
-        farther = np.nan_to_num(shown - truth.depth, posinf=np.inf, neginf=-np.inf)
-    return PixelErrors(
-        float(wrong.mean()),
-        float((wrong & (farther > CLEARLY_BEHIND)).mean()),
-        float((wrong & (farther < -CLEARLY_BEHIND)).mean()),
-    )
+    least, greatest = corner_depths(corners, depths)
+    behind, before = least[ids] > truth.depth + CLEARLY_BEHIND, greatest[ids] < truth.depth - CLEARLY_BEHIND
+    return PixelErrors(float(wrong.mean()), float((wrong & behind).mean()), float((wrong & before).mean()))
 
 
-def nearest_depth(
-    ids: NDArray[np.int32], corners: NDArray[np.float64], depths: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Least depth of the corners of the triangle that each pixel shows, infinite where it shows none: a bound.
+def corner_depths(
+    corners: NDArray[np.float64], depths: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest depth of each triangle's corners, and at the end those of nothing: infinitely far.
 
-    A neighbour that reaches over an edge by a fraction of a pixel has corners as near as what it covers, whatever
-    its plane says outside of it; a surface behind has not.
+    A neighbour that reaches over an edge by a fraction of a pixel has a corner as near, and one as far, as what it
+    covers, whatever its plane says out there; a surface behind or before has not.
     """
-    least = np.append((depths / corners[:, :, 2]).min(axis=1), np.inf)
-    shown: NDArray[np.float64] = least[ids]
-    return shown
+    deep = depths / corners[:, :, 2]
+    return np.append(deep.min(axis=1), np.inf), np.append(deep.max(axis=1), np.inf)
 
 
 def depth_errors(
