@@ -106,7 +106,7 @@ CASES = {
         (ROUNDED, DROPPED, DROPPED)
     ),
     "before the near plane": Case(
-        "depth towards the eye", "near planes", tuple(0.25 * k for k in range(13)), "linear", _near,
+        "depth", "near planes", tuple(0.25 * k for k in range(13)), "linear", _near,
         (ROUNDED, DRAWN, DRAWN),
     ),
 }  # fmt: skip
