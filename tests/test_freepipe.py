@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.errors import TilestampError
-from models.simt import AtomicMerge, Simt
+from models.simt import AtomicMerge, Coalescing, Simt
 from simulator.pipelines.freepipe import freepipe as pipeline
 from simulator.scenes.scene import Mesh, Scene
 from simulator.stages.liu2010.freepipe import freepipe
@@ -62,9 +62,18 @@ def test_each_pixel_shows_the_nearest_triangle_that_covers_it():
 
 def test_a_warp_runs_as_long_as_its_largest_triangle():
     positions, triangles = flat([*LARGE, *(TINY * 31)])
-    _, (work,), _ = freepipe(positions, triangles, 64, 64, Simt())
-    alone = freepipe(*flat(LARGE), 64, 64, Simt())[1][0]
+    simt = Simt(coalescing=Coalescing.WARP_LINES)
+    _, (work,), _ = freepipe(positions, triangles, 64, 64, simt)
+    alone = freepipe(*flat(LARGE), 64, 64, simt)[1][0]
     assert work.total(E.WARP_STEPS) == alone.total(E.WARP_STEPS) == 60 * 60
+    assert work.total(E.SAMPLE_TESTS) == 60 * 60 + 31
+
+
+def test_an_unrolled_loop_takes_the_pixels_beyond_a_multiple_of_four_by_themselves():
+    positions, triangles = flat([*LARGE, *(TINY * 31)])
+    _, (work,), _ = freepipe(positions, triangles, 64, 64, Simt(coalescing=Coalescing.WARP_SECTORS))
+    assert work.total(E.REST_STEPS) == 1  # the small ones' only pixel; 60 is a multiple of four
+    assert work.total(E.WARP_STEPS) == 60 * 60 + 1
     assert work.total(E.SAMPLE_TESTS) == 60 * 60 + 31
 
 
