@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.frontier.methods_notes import notes
+from experiments.frontier.methods_notes import TIES, notes
 from experiments.frontier.methods_scenes import AREAS, AREAS_LONG, Subject, lattice, patches, subjects, textured_subject
 from experiments.frontier.methods_truth import QUICK_SIDE, Truth
 from experiments.frontier.methods_variants import (
@@ -145,14 +145,17 @@ def _milliseconds(drawn: Drawn) -> Iterator[tuple[str, float]]:
 
 
 def _mark_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
-    """Add whether anything of a row's scene and machine beats it in both time and error, and anything in software."""
+    """Add whether anything of a row's scene and machine beats it in both time and error, and anything in software.
+
+    Errors are compared in steps of ``TIES``: what nobody can see is no gain.
+    """
     for error in MEASURES:
         table[f"front_{error}"] = False
         table[f"software_front_{error}"] = False
         for _, rows in table.groupby(["scene", "machine"], sort=False):
-            table.loc[rows.index, f"front_{error}"] = pareto_front(rows["ms"], rows[error])
-            soft = rows[~rows.fixed_function]
-            table.loc[soft.index, f"software_front_{error}"] = pareto_front(soft["ms"], soft[error])
+            for column, kept in (("front", rows), ("software_front", rows[~rows.fixed_function])):
+                steps = (kept[error] / TIES[error]).round()
+                table.loc[kept.index, f"{column}_{error}"] = pareto_front(kept["ms"], steps)
     return table
 
 

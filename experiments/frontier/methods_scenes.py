@@ -46,7 +46,7 @@ def subjects(areas: tuple[float, ...] = AREAS) -> list[Subject]:
     for area in areas:
         size = SMALL if area < 1.0 else SIZE
         made.append(Subject(f"{area:g} px", sheets(area, *size), *size, np.eye(4)))
-    return [*made, Subject("spot", real("spot", *SIZE), *SIZE, np.eye(4))]
+    return [*made, Subject("teapot, triangles", real("teapot", *SIZE), *SIZE, np.eye(4))]
 
 
 def patches(name: str = "teapot") -> Subject:
