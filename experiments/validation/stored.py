@@ -84,9 +84,9 @@ def read(path: Path) -> dict[tuple[Any, ...], float]:
         raise TilestampError(f"{path} lacks the columns {', '.join(sorted(missing))}")
     table = table[table.source.isin(["cupti", "ncu_cold"])]
     if path.name == CUDARASTER:
-        copied = table.variant == AS_PUBLISHED
-        table = table[~copied | table.kernel.isin(COPYING)]
-        table = table.assign(kernel=table.kernel.where(table.variant != AS_PUBLISHED, table.kernel + " as published"))
+        copying = (table.variant == AS_PUBLISHED) & table.kernel.isin(COPYING)
+        table = table.assign(kernel=table.kernel.where(~copying, table.kernel + f" {VARIANT}"))
+        table = table.sort_values("variant", kind="stable")  # of kernels that do not copy, the later rows count
     for column in ("tile", "spp"):
         if column not in table:
             table = table.assign(**{column: 0})
@@ -140,7 +140,7 @@ def cudaraster_works(
         for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
             yield (scene, width, 0, 0, work.kernel), work
             if work.kernel in COPYING:
-                yield (scene, width, 0, 0, f"{work.kernel} as published"), with_parameter_copy(work)
+                yield (scene, width, 0, 0, f"{work.kernel} {VARIANT}"), with_parameter_copy(work)
 
 
 def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine, **options: Any) -> list[Work]:
