@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from models.auto import ERROR
 from models.bounds import asked_of, bounds, longest
+from models.errors import TilestampError
 from models.events import EVENTS, MachineEvent
 from models.fidelity_bound import latest_end
 from models.fixed_function import PipeLaunch
@@ -19,7 +20,8 @@ from simulator import simulate
 from simulator.pipelines import pipeline_names
 
 ROUNDING = 1 + 1e-9
-MACHINES = ("gtx280", "gtx480", "h200")
+GTX280, GTX480, H200 = (load_machine(name) for name in ("gtx280", "gtx480", "h200"))
+MACHINES = (GTX280, GTX480, H200)
 COLUMNS = ("FP32", "SHARED", "CHAIN_LOAD", "LOAD_BYTES", "ATOMIC_REQUESTS")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 
@@ -39,7 +41,7 @@ def latest_cycles(what, machine, moved=NOTHING):
     return asked.terms["launch"] + max(end, longest(asked.terms, asked.units))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=100)
 @given(
     units=st.integers(1, 1500),
     seed=st.integers(0, 10**6),
@@ -55,32 +57,29 @@ def test_no_schedule_ends_after_the_latest_end(units, seed, dispatch, machine, b
     events = {name: scale[i] * draw.lognormal(0, spread, units) for i, name in enumerate(COLUMNS)}
     what = launch(units, block, dispatch, 40, **events)
     moved = Traffic(float(events["LOAD_BYTES"].sum()), 0.0, 1.0)
-    described = load_machine(machine)
-    assert schedule(what, described, moved).cycles <= latest_cycles(what, described, moved) * ROUNDING
+    assert schedule(what, machine, moved).cycles <= latest_cycles(what, machine, moved) * ROUNDING
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=40)
 @given(units=st.integers(1, 3000), seed=st.integers(0, 10**6), machine=st.sampled_from(MACHINES))
 def test_no_order_of_units_ends_after_the_latest_end(units, seed, machine):
     """Sorted units: giants first or last, phases of one term and then of another."""
     draw = np.random.default_rng(seed)
     work = np.sort(draw.lognormal(6, 2, units))
     what = launch(units, FP32=work[:: draw.choice([-1, 1])], CHAIN_LOAD=np.sort(draw.lognormal(1, 1, units)))
-    described = load_machine(machine)
-    assert schedule(what, described, NOTHING).cycles <= latest_cycles(what, described) * ROUNDING
+    assert schedule(what, machine, NOTHING).cycles <= latest_cycles(what, machine) * ROUNDING
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: machine.name)
 @pytest.mark.parametrize("column", COLUMNS)
 def test_of_many_equal_units_the_latest_end_is_the_schedule(machine, column):
     """What is certain is known: no competition, and a tail of one unit in fifty."""
-    described = load_machine(machine)
-    what = launch(50 * 32 * described.sm.count, **{column: 5000})
-    assert latest_cycles(what, described) <= 1.03 * schedule(what, described, NOTHING).cycles
+    what = launch(50 * 32 * machine.sm.count, **{column: 5000})
+    assert latest_cycles(what, machine) <= 1.03 * schedule(what, machine, NOTHING).cycles
 
 
 def test_one_unit_is_known_to_the_cycle():
-    what, machine = launch(1, FP32=10**6, CHAIN_LOAD=50), load_machine("h200")
+    what, machine = launch(1, FP32=10**6, CHAIN_LOAD=50), H200
     assert latest_cycles(what, machine) == pytest.approx(schedule(what, machine, NOTHING).cycles)
 
 
@@ -92,8 +91,6 @@ def frames(request):
 
 
 def _launched(run):
-    from models.errors import TilestampError
-
     try:
         price(run.launches, run.machine, "bounds")
     except TilestampError:
@@ -110,7 +107,7 @@ def test_the_bound_holds_for_every_launch_of_every_pipeline_on_every_machine(fra
                 assert played(asked, loads(asked)).cycles <= latest * ROUNDING, (what.kernel, run.machine.name)
 
 
-@pytest.mark.parametrize("error", [0.01, 0.1, 0.4])
+@pytest.mark.parametrize("error", [0.01, 0.1])
 def test_the_frame_is_within_the_error_of_its_schedule(frames, error):
     for run in frames:
         ours, full = (sum(t.cycles for t in price(run.launches, run.machine, f, error)) for f in ("auto", "schedule"))
@@ -133,13 +130,13 @@ def test_every_launch_says_what_was_chosen_and_why(frames):
 def test_a_launch_of_unlike_units_is_escalated_and_names_its_tail():
     work = np.full(5000, 100.0)
     work[-1] = 10**6
-    (got,) = price([launch(5000, FP32=work)], load_machine("gtx280"), "auto")
+    (got,) = price([launch(5000, FP32=work)], GTX280, "auto")
     assert got.fidelity == "schedule"
     assert got.why.startswith("tail")
 
 
 def test_a_launch_of_equal_units_stays_at_its_roofline():
-    what, machine = launch(132 * 32 * 50, FP32=5000), load_machine("h200")
+    what, machine = launch(132 * 32 * 50, FP32=5000), H200
     (got,) = price([what], machine, "auto")
     assert got.fidelity == "bounds"
     assert got.cycles == bounds(what, machine, traffic([what], machine)[0]).cycles
@@ -147,7 +144,7 @@ def test_a_launch_of_equal_units_stays_at_its_roofline():
 
 
 def test_a_small_launch_stays_beside_a_large_one_and_is_escalated_alone():
-    machine = load_machine("gtx280")
+    machine = GTX280
     work = np.full(300, 100.0)
     work[-1] = 10**5
     small, large = launch(300, FP32=work), launch(30 * 8 * 500, FP32=50000)
@@ -168,11 +165,11 @@ def test_a_smaller_error_never_escalates_less(frames):
 
 
 def test_a_fixed_function_pass_is_exact_at_every_fidelity():
-    got = price([PipeLaunch("hardware", "draw", {"primitives": 1e6})], load_machine("gtx480"), "auto")[0]
+    got = price([PipeLaunch("hardware", "draw", {"primitives": 1e6})], GTX480, "auto")[0]
     assert got.error_bound == 0.0
     assert got.why == "fixed function"
 
 
 def test_a_launch_without_work_is_known():
-    (got,) = price([launch(0, grid=1)], load_machine("h200"), "auto")
+    (got,) = price([launch(0, grid=1)], H200, "auto")
     assert got.error_bound == 0.0
