@@ -199,3 +199,14 @@ def test_where_the_tail_decides_and_a_sample_cannot_tell_everything_runs():
 def test_an_error_that_is_no_share_is_refused(error):
     with pytest.raises(TilestampError, match="error is a share of the value"):
         simulate("teapot", error=error)
+
+
+@pytest.mark.parametrize(("pipeline", "machine"), [("micropolygon", "gtx280"), ("cudaraster", "gtx480")])
+def test_without_a_picture_the_numbers_are_the_same(pipeline, machine):
+    options = {"width": 160, "height": 120}
+    drawn = simulate("teapot", pipeline, machine, **options)
+    numbers = simulate("teapot", pipeline, machine, picture=False, **options)
+    assert numbers.counts == drawn.counts
+    assert numbers.milliseconds == drawn.milliseconds
+    with pytest.raises(TilestampError, match="only numbers were asked for; ask with picture=True"):
+        _ = numbers.image

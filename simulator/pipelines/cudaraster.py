@@ -62,6 +62,7 @@ def cudaraster(
     copy_parameters: bool = False,
     counting: bool = True,
     sample: Sampler | None = None,
+    picture: bool = True,
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
@@ -90,6 +91,8 @@ def cudaraster(
     counting : bool
     sample : Sampler, optional
         Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
+    picture : bool
+        Without it vertices have no colours, and no picture comes back.
 
     Returns
     -------
@@ -110,12 +113,14 @@ def cudaraster(
     options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
     if sample is not None and batches == 1:
         return Frame.numbers(sampled_draw(sample, positions, mesh.triangles, width, height, simt, options))
-    colors = None if mode == "depth-only" else vertex_colors(mesh, matrix)
+    colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
     state = _State(options, (width, height), simt, counting, colors)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
         _draw(state, positions, mesh.triangles[first:last], first)
     if copy_parameters:
         state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
+    if not picture:
+        return Frame.numbers(state.works, frame_facts(state.counters, state.needed, release, state.retries))
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]

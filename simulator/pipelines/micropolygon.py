@@ -45,6 +45,7 @@ def micropolygon(
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
     sample: Sampler | None = None,
+    picture: bool = True,
 ) -> Frame:
     """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 
@@ -77,6 +78,8 @@ def micropolygon(
         Count what the machine does.
     sample : Sampler, optional
         Run part of the units; no picture comes back.
+    picture : bool
+        Without it vertices are not shaded, and no picture comes back.
 
     Returns
     -------
@@ -106,7 +109,9 @@ def micropolygon(
             sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=options
         )
         return Frame.numbers([*split, *rest], _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS)))
-    grids, diced = dice(points, subpatches, matrix, width, height, simt, texture=texture, counting=counting)
+    grids, diced = dice(
+        points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
+    )
     if hybrid:
         return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
@@ -128,7 +133,8 @@ def micropolygon(
     )
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
-    return Frame(image, depth, works, maps=maps, facts=_facts(subpatches, len(lists)))
+    facts = _facts(subpatches, len(lists))
+    return Frame(image, depth, works, maps=maps, facts=facts) if picture else Frame.numbers(works, facts)
 
 
 def _maps(
