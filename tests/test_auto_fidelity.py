@@ -73,9 +73,9 @@ def test_no_order_of_units_ends_after_the_latest_end(units, seed, machine):
 @pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: machine.name)
 @pytest.mark.parametrize("column", COLUMNS)
 def test_of_many_equal_units_the_latest_end_is_the_schedule(machine, column):
-    """What is certain is known: no competition, and a tail of one unit in fifty."""
-    what = launch(50 * 32 * machine.sm.count, **{column: 5000})
-    assert latest_cycles(what, machine) <= 1.03 * schedule(what, machine, NOTHING).cycles
+    """What is certain is known: no competition, and a tail of one unit in twenty."""
+    what = launch(20 * 32 * machine.sm.count, **{column: 5000})
+    assert latest_cycles(what, machine) <= 1.06 * schedule(what, machine, NOTHING).cycles
 
 
 def test_one_unit_is_known_to_the_cycle():
