@@ -24,9 +24,10 @@ def sampling_plot(table: "pd.DataFrame", path: Path, *, aim: tuple[float, float]
         Relative error and share of the full run's seconds.
     """
     with figure(path, "What sampling saves: seconds against the error of the frame's time", figsize=(8.2, 5.2)) as axes:
-        for color, (scene, rows) in zip(PALETTE * 3, table.groupby("scene", sort=False), strict=False):
+        for i, (scene, rows) in enumerate(table.groupby("scene", sort=False)):
+            color, marker = PALETTE[i % len(PALETTE)], "os^D"[i // len(PALETTE) % 4]
             error = rows.milliseconds_error.clip(lower=FLOOR)
-            axes.plot(error, rows.share_of_full, "o-", markersize=5, linewidth=0.8, color=color, label=scene)
+            axes.plot(error, rows.share_of_full, marker=marker, markersize=5, linewidth=0.8, color=color, label=scene)
             right = rows.milliseconds_half_width.clip(lower=FLOOR)
             axes.hlines(
                 rows.share_of_full, error.where(error < right, right), right, color=color, alpha=0.4, linewidth=3
