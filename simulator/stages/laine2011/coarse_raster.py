@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from models.coalescing import SECTOR_BYTES
 from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts
@@ -189,10 +190,14 @@ def _work(
         _count_sort(rest, len(given.starts) - 1)
     table = np.vstack([rest, events])
     entries = len(given.entries) * ENTRY_BYTES
+    again = _totals_again(len(given.starts) - 1, given.segment_bytes) * simt.sms
     streams = (
         Stream("bin_queues", "load", entries, entries),
         Stream(
-            "headers", "load", max(int(table[:, E.LOAD_BYTES].sum()) - entries, 0), len(given.headers) * HEADER_BYTES
+            "headers",
+            "load",
+            max(int(table[:, E.LOAD_BYTES].sum()) - entries - again, 0),
+            len(given.headers) * HEADER_BYTES,
         ),
         Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
     )
@@ -233,6 +238,18 @@ def _sort_loads(bins: int, segment_bytes: int) -> tuple[int, int, int]:
         STREAMS * -(-bins * STREAMS * ENTRY_BYTES // segment_bytes) // max(STREAMS * ENTRY_BYTES // segment_bytes, 1)
     )
     return loads, 2 * WARPS + lines, (2 * WARPS + lines) * segment_bytes
+
+
+def _totals_again(bins: int, segment_bytes: int) -> int:
+    """Bytes of a block's loads of totals that its L1 holds: a lane reads the 16 words of its bin one after another.
+
+    Machines that load by lines keep them: chains of their mixes were fitted with these loads in.
+    """
+    if segment_bytes != SECTOR_BYTES:
+        return 0
+    row = STREAMS * ENTRY_BYTES
+    loaded = _sort_loads(bins, segment_bytes)[2] - 2 * WARPS * segment_bytes
+    return loaded - -(-bins * row // segment_bytes) * segment_bytes
 
 
 def _counters(work: Work) -> dict[str, tuple[int, int]]:
