@@ -201,6 +201,7 @@ def _figures(table: "pd.DataFrame", worst: dict[str, tuple[float, Drawn]]) -> li
 def _front(table: "pd.DataFrame", machine: str, error: str) -> Figure:
     """Time against one measure of error, a panel a scene."""
     rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
+    rows = rows[rows.groupby("scene")[error].transform("max") > 0]  # a scene without an error has no front to show
     rows = rows.assign(front=rows[f"front_{error}"], second=rows[f"software_front_{error}"])
     words, title = MEASURES[error]
     columns: dict[str, Any] = {
