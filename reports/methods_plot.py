@@ -12,7 +12,7 @@ from reports.style import PALETTE, figure
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = 4
+COLUMNS = (5, 4, 3)  # whichever leaves the fewest places empty
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "black", "linewidth": 0.9},
     {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
@@ -47,16 +47,18 @@ def panels(
     """
     names = list(dict.fromkeys(table[panel]))
     groups = list(dict.fromkeys(table[group]))
-    rows = -(-(len(names) + 1) // COLUMNS)  # the legend has a place of its own
-    size = (3.5 * COLUMNS, 3.1 * rows + 0.4)
-    with figure(path, title, nrows=rows, ncols=COLUMNS, figsize=size, squeeze=False) as grid:
+    places = len(names) + 1  # the legend has one of its own
+    columns = min(COLUMNS, key=lambda count: -places % count)
+    rows = -(-places // columns)
+    size = (3.5 * columns, 3.1 * rows + 0.4)
+    with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
             _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, (front, second))
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
         for axes in grid[:, 0]:
             axes.set_ylabel(y_label, fontsize=8)
-        for axes in grid.flat[max(len(names) - COLUMNS, 0) : len(names)]:
+        for axes in grid.flat[max(len(names) - columns, 0) : len(names)]:
             axes.set_xlabel(x_label, fontsize=8)
         handles = [*(_mark(k) for k in range(len(groups))), *map(_line, LINES)]
         grid.flat[len(names)].legend(handles, [*groups, "front", "front of software"], fontsize=8, loc="upper left")
