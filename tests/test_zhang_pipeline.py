@@ -10,6 +10,7 @@ from models.launch_graph import Node, as_graph, on_stream
 from models.machine import altered, load_machine
 from models.price import price
 from models.simt import Simt
+from simulator import simulate
 from simulator.mix import load_mix
 from simulator.pipelines.binned import binned
 from simulator.scenes.camera import LookAt
@@ -270,3 +271,11 @@ def test_coordinates_of_a_quad_are_perspective_correct_within_1e_5(scene, matrix
         for k in range(4):
             exact = naive.perspective(screen[t], mesh.uvs[t], x + k % 2 + 0.5, y + k // 2 + 0.5)
             assert uv[k] == pytest.approx(exact, abs=1e-5 * max(1.0, 1000.0 / abs(area)))
+
+
+def test_an_image_of_one_bin_keeps_its_pixels():
+    """The cursors of tile queues once were a view of their starts, and moved them."""
+    small = simulate("teapot", "binned", "ga104", width=96, height=72)
+    other = simulate("teapot", "cudaraster", "ga104", width=96, height=72)
+    drawn, expected = (small.triangle_ids >= 0).sum(), (other.triangle_ids >= 0).sum()
+    assert abs(int(drawn) - int(expected)) < 0.05 * expected
