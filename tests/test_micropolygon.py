@@ -7,6 +7,7 @@ from models.errors import TilestampError
 from models.simt import AtomicMerge, Coalescing, Simt
 from simulator.pipelines.micropolygon import micropolygon
 from simulator.scenes import Scene, load_scene, read_camera
+from simulator.simulation import simulate
 from simulator.stages.eisenacher2010.bucket_count import BucketCountEvent
 from simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent
 from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
@@ -88,3 +89,30 @@ def test_a_scene_without_patches_is_refused():
 def test_options_out_of_range_are_named(option, message):
     with pytest.raises(TilestampError, match=message):
         teapot(**option)
+
+
+def test_a_near_limit_culls_what_lies_before_it():
+    everything, nothing = teapot(near=0.0), teapot(near=1e6)
+    assert everything.facts["subpatches"] > 0
+    assert nothing.facts["subpatches"] == 0
+    assert (nothing.depth == 1).all()
+
+
+def test_a_least_depth_halves_every_patch_so_often():
+    depths = len(teapot(bound=200).facts["queue_passes"]), len(teapot(bound=200, min_depth=4).facts["queue_passes"])
+    assert depths[0] < depths[1] == 5
+
+
+def test_snapped_edges_are_a_stage_of_their_own_that_dices_again():
+    run = simulate("teapot", width=WIDTH, height=HEIGHT, snap_edges=True)
+    plain = simulate("teapot", width=WIDTH, height=HEIGHT)
+    assert list(run.stages.index) == [*plain.stages.index[:2], "snap_edges", *plain.stages.index[2:]]
+    assert run.counts["snap_edges.LOOKUPS"] >= run.counts["snap_edges.SNAPPED"] > 0
+    assert run.counts["snap_edges.PATCHES"] == run.counts["snap_edges.SNAPPED"] < run.counts["dice.PATCHES"]
+    assert run.stages.milliseconds["snap_edges"] > 0
+
+
+def test_look_ups_have_no_price():
+    run = simulate("teapot", width=WIDTH, height=HEIGHT, snap_edges=True)
+    launch = next(launch for launch in run.launches if launch.kernel == "snap_edges")
+    assert not launch.events.any()

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from experiments.registry import Progress
 from experiments.result import Figure, Result
 from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.patch_frames import Drawn, Split, dice_again, draw, milliseconds, split
+from experiments.stability.patch_frames import MACHINE, Drawn, Split, draw, milliseconds, simt_of, split
 from reports.plots import lines
 from reports.ste_plots import wrong_pixels
 from simulator.scenes.camera import LookAt
-from simulator.stages.eisenacher2010.snap_edges import Snapped, shared_edges, snap_edges
+from simulator.stages.eisenacher2010.snap_edges import Snapped, shared_edges, snap_edges, snap_works
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,7 +79,8 @@ def cracks(bound: float, seed: int, cure: Cure = "as published") -> NDArray[np.b
     for _ in range(INSIDE):
         around = np.pad(inside, 1)
         inside = inside & around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
-    return np.logical_and(inside, frame(bound, seed, cure).hits == 0)
+    crack: NDArray[np.bool_] = inside & (frame(bound, seed, cure).hits == 0)
+    return crack
 
 
 def crack_pixels(bound: float, cure: Cure = "as published") -> int:
@@ -132,10 +133,10 @@ def _row(bound: float, cure: Cure) -> dict[str, float | str]:
     extra = lookups = 0  # sub-patches that are diced again, for the ends of the lines
     if cure == "snapped edges":
         for seed in SEEDS:
-            made, snap = front_end(bound, seed).subpatches, snapped(bound, seed)
-            works += dice_again(sheet(seed), made, snap.touched, VIEW.matrix(WIDTH, HEIGHT), WIDTH, HEIGHT)
+            snap = snapped(bound, seed)
+            works += snap_works(snap, CELLS**2, simt_of(MACHINE))
             extra += int(snap.touched.sum())
-            lookups += snap.lookups
+            lookups += int(snap.lookups.sum())
     return {
         "bound": bound,
         "cure": cure,
@@ -170,6 +171,6 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     left = {cure: int(table[table.cure == cure].crack_pixels.sum()) for cure in CURES}
     covered = sum(int((frame(BOUNDS[0], seed, "as published").hits > 0).sum()) for seed in SEEDS)
     return [
-        f"At the paper's bounds of 4 and 8 pixels {small.crack_pixels.sum()} of {2 * covered} covered pixels are cracks.",
+        f"At the paper's bounds, 4 and 8 pixels, {small.crack_pixels.sum()} of {2 * covered} pixels are cracks.",
         "Crack pixels at all bounds together: " + ", ".join(f"{n} {cure}" for cure, n in left.items()) + ".",
     ]

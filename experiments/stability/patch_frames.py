@@ -64,20 +64,6 @@ def split(
     return Split(subpatches, grids, works + diced)
 
 
-def dice_again(
-    points: NDArray[np.float32],
-    subpatches: SubPatches,
-    chosen: NDArray[np.bool_],
-    matrix: ArrayLike,
-    width: int,
-    height: int,
-) -> list[Work]:
-    """Works of dicing the chosen sub-patches once more."""
-    patch, level, i, j, passes = subpatches
-    part = SubPatches(patch[chosen], level[chosen], i[chosen], j[chosen], passes)
-    return dice(points, part, matrix, width, height, simt_of(MACHINE))[1]
-
-
 def draw(
     grids: Grids, width: int, height: int, *, tile: int = 8, bound: float = 4.0, simt: Simt | None = None
 ) -> Drawn:

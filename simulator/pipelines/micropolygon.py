@@ -17,6 +17,7 @@ from simulator.pipelines._micropolygon_hybrid import draw_grids
 from simulator.pipelines._micropolygon_sampled import sampled_back_end
 from simulator.sampler import Sampler
 from simulator.scenes.scene import Scene
+from simulator.stages.eisenacher2010 import snap_edges as snapping
 from simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
 from simulator.stages.eisenacher2010.bucket_count import bucket_count
 from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
@@ -41,6 +42,9 @@ def micropolygon(
     bound_rule: BoundRule = "control_points",
     box_tests: bool = True,
     edges: Literal["computed", "loaded"] = "computed",
+    near: float = 0.0,
+    min_depth: int = 0,
+    snap_edges: bool = False,
     hybrid: bool = False,
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
@@ -70,6 +74,14 @@ def micropolygon(
         Test boxes before edge functions.
     edges : {"computed", "loaded"}
         Edge equations computed by each thread, or computed while dicing and loaded.
+    near : float
+        Sub-patches wholly nearer to the eye's plane than this are culled, so that splitting across it ends (not in the
+        paper).
+    min_depth : int
+        Halvings that every sub-patch takes; as many as the deepest needs leave no cracks.
+    snap_edges : bool
+        Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks
+        (not in the paper). Its look-ups are counted and not priced. A sampled run then samples bound and split alone.
     hybrid : bool
         Give the diced grids to the fixed-function rasterizer.
     texture : ndarray, (H, W, 3 or 4), uint8, optional
@@ -97,10 +109,10 @@ def micropolygon(
         raise TilestampError(f"texture must be an array of (H, W, 3 or 4) bytes, not {texture!r}")
     points = scene.patches.points
     tiles = screen_tiles(width, height, tile, bound)
-    boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid else None
+    boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid and not snap_edges else None
     subpatches, split = bound_and_split(
-        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, wanted=boxes,
-        sample=sample,
+        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, near=near,
+        min_depth=min_depth, wanted=boxes, sample=sample,
     )  # fmt: skip
     if sample and boxes and len(subpatches.patch):
         options = {"spp": spp, "box_tests": box_tests, "edges": edges}
@@ -112,6 +124,11 @@ def micropolygon(
     grids, diced = dice(
         points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
     )
+    if snap_edges:
+        snapped = snapping.snap_edges(subpatches, grids, snapping.shared_edges(points))
+        grids = snapped.grids
+        if counting:
+            diced += snapping.snap_works(snapped, len(points), simt, textured=texture is not None)
     if hybrid:
         return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)

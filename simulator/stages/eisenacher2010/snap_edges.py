@@ -5,19 +5,34 @@ different depths, the finer one has vertices between those of the coarser, and o
 Here such vertices are put on these lines. Neighbours are found by a table of the sub-patches of the final queue: for
 each edge the cells of growing size on its other side are looked up, across edges that patches share as well. Coarse
 sub-patches come first, because their own corners may lie on the edge of one that is coarser still.
+
+The machine would dice the sub-patches with such a vertex again, for the ends of the lines, and look neighbours up:
+the one is priced as dicing, the other only counted.
 """
 
+from dataclasses import replace
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from models.simt import Simt
 from simulator.stages.eisenacher2010.bound_and_split import SubPatches
-from simulator.stages.eisenacher2010.dice import Grids
+from simulator.stages.eisenacher2010.dice import Grids, dice_work
+from simulator.work import Work
 
 _I64 = NDArray[np.int64]
 EDGES = np.array([[0, 1, 2, 3], [12, 13, 14, 15], [0, 4, 8, 12], [3, 7, 11, 15]])  # points by edge: v 0, v 1, u 0, u 1
 SEGMENTS = 3  # of a grid's edge
+BLOCK = 256  # threads, a sub-patch each
+
+
+class SnapEvent(IntEnum):
+    """Events of one block."""
+
+    LOOKUPS = 0  # in the table of sub-patches, a lane each; without a price
+    SNAPPED = 1  # sub-patches with a vertex that was looked at
 
 
 class Snapped(NamedTuple):
@@ -25,7 +40,7 @@ class Snapped(NamedTuple):
 
     grids: Grids
     touched: NDArray[np.bool_]  # (N,) sub-patches with a vertex that was looked at
-    lookups: int  # in the table of sub-patches
+    lookups: _I64  # (N,) in the table of sub-patches
 
 
 def shared_edges(points: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -66,18 +81,41 @@ def snap_edges(subpatches: SubPatches, grids: Grids, shared: NDArray[np.int64]) 
     keys = _keys(patch, level, i, j)
     order = np.argsort(keys)
     table = keys[order]
-    vertices, touched, lookups = grids.vertices.copy(), np.zeros(len(keys), np.bool_), 0
+    vertices, touched, lookups = grids.vertices.copy(), np.zeros(len(keys), np.bool_), np.zeros(len(keys), np.int64)
     for depth in np.unique(level)[1:]:
         cells = np.flatnonzero(level == depth)
         for edge in range(4):
             fine, other, other_edge, along = _across(cells, edge, depth, patch, i, j, shared)
             for up in range(1, int(depth) + 1):
-                lookups += len(fine)
+                lookups[fine] += 1
                 at, known = _find(table, other, other_edge, along, int(depth), up)
                 _snap(vertices, fine[known], edge, order[at[known]], other_edge[known], along[known], up)
                 touched[fine[known]] = True
                 fine, other, other_edge, along = (a[~known] for a in (fine, other, other_edge, along))
     return Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
+
+
+def snap_works(snapped: Snapped, patches: int, simt: Simt, *, textured: bool = False) -> list[Work]:
+    """Works of snapping: the look-ups, and dicing the sub-patches concerned again; none where all are of one depth.
+
+    Parameters
+    ----------
+    snapped : Snapped
+    patches : int
+        UrPatches of the scene.
+    simt : Simt
+    textured : bool
+    """
+    if not snapped.touched.any():
+        return []
+    starts = np.arange(0, len(snapped.touched), BLOCK)
+    counts = np.stack([snapped.lookups, snapped.touched], axis=1).astype(np.int64)
+    table = np.add.reduceat(counts, starts, axis=0)
+    again = dice_work(int(snapped.touched.sum()), patches, textured, simt)
+    return [
+        Work("snap_edges", "snap_edges", SnapEvent, table, len(starts), BLOCK),
+        replace(again, stage="snap_edges"),
+    ]
 
 
 def _keys(patch: _I64, level: _I64, i: _I64, j: _I64) -> _I64:
