@@ -10,6 +10,7 @@ from models.simt import Simt
 from simulator.pipelines import cudaraster as module
 from simulator.pipelines.cudaraster import cudaraster
 from simulator.scenes.scene import Mesh, Scene
+from simulator.simulation import simulate
 from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tests import naive_cudaraster as naive
 
@@ -106,6 +107,25 @@ def test_a_buffer_that_is_too_small_grows_and_the_frame_is_drawn_again(monkeypat
     plain = draw(soup(), (300, 300))
     assert plain.facts["retries"] == 0
     assert np.array_equal(small.triangle_ids, plain.triangle_ids)
+    assert small.facts["counters"] == plain.facts["counters"]
+
+
+def test_the_machine_executes_the_stages_of_attempts_that_fail(monkeypatch):
+    monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
+    monkeypatch.setattr(module.tiles, "initial_capacity", lambda *_: 1)
+    works = draw(soup(), (300, 300)).works
+    assert [work.stage for work in works] == [*STAGES[:2], *STAGES[:3], *STAGES]
+    for stage in STAGES:
+        tables = [work.table for work in works if work.stage == stage]
+        assert all(np.array_equal(table, tables[0]) for table in tables)
+
+
+def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
+    monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
+    run = simulate(soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5)
+    assert run.sampled
+    assert [work.stage for work in run.frame.works] == [*STAGES[:2], *STAGES]
+    assert run.frame.facts["retries"] == 1
 
 
 def test_counting_off_changes_no_picture():

@@ -2,14 +2,23 @@
 
 from typing import Any
 
-from simulator.stages.laine2011.bin_raster import SEGMENT_BYTES as BIN_SEGMENT_BYTES
-from simulator.stages.laine2011.coarse_raster import SEGMENT_BYTES as TILE_SEGMENT_BYTES
+from simulator.stages.laine2011 import bin_raster as bins
+from simulator.stages.laine2011 import coarse_raster as tiles
 from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
-from simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
+from simulator.stages.laine2011.triangle_setup import SLACK, SUBTRIANGLE_BYTES
 from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
 from simulator.work import Work
 
 Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name
+
+
+def first_room(triangles: int, width: int, height: int) -> dict[str, int]:
+    """Room that the first attempt of a draw has, by queue, in the order in which they are filled."""
+    return {
+        "numSubtris": triangles + SLACK,
+        "numBinSegs": bins.initial_capacity(triangles, width, height),
+        "numTileSegs": tiles.initial_capacity(triangles, width, height),
+    }
 
 
 def setup_counters(setup: Work, fine: Work, drawn: int, triangles: int) -> Counters:
@@ -67,8 +76,8 @@ def frame_facts(sums: Counters, queues: dict[str, int], release: str, retries: i
     """
     megabytes = {
         "setup data": queues["numSubtris"] * SUBTRIANGLE_BYTES[release] / 2**20,
-        "bin queues": queues["numBinSegs"] * BIN_SEGMENT_BYTES / 2**20,
-        "tile queues": queues["numTileSegs"] * TILE_SEGMENT_BYTES / 2**20,
+        "bin queues": queues["numBinSegs"] * bins.SEGMENT_BYTES / 2**20,
+        "tile queues": queues["numTileSegs"] * tiles.SEGMENT_BYTES / 2**20,
     }
     return {
         **queues,

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.simt import Simt
+from simulator.frame import Frame
+from simulator.pipelines._cudaraster_facts import first_room
 from simulator.sampler import Sampler
 from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
@@ -26,8 +29,10 @@ def sampled_draw(
     height: int,
     simt: Simt,
     options: dict[str, Any],
-) -> list[Work]:
+) -> Frame:
     """One draw: all triangles set up, binned and listed; counted in part of the blocks, and drawn in part of the tiles.
+
+    Where a queue is too small for the first attempt, the stages up to it stand among the works once more.
 
     Parameters
     ----------
@@ -48,11 +53,11 @@ def sampled_draw(
         triangle_setup, positions, **shape, samples=samples, cull_backfaces=options["cull_backfaces"],
         depth=depth, interpolate=interpolate, capacity=MAX_SUBTRIANGLES,
     )  # fmt: skip
-    setup, all_of_it, _ = prepare(triangles, counting=False)
+    setup, all_of_it, facts = prepare(triangles, counting=False)
     visible = np.add.reduceat(setup.subtriangles > 0, np.arange(0, len(triangles), BLOCK), dtype=np.int64)
     setup_work = sample.stage(visible, partial(_count_setup, prepare, triangles, mode), lambda _: all_of_it.streams)
-    queues, bin_work, _ = bins.bin_raster(setup, **shape)
-    lists, tile_work, _ = tiles.coarse_raster(queues, setup, deferred_clear=True, **shape)
+    queues, bin_work, bin_facts = bins.bin_raster(setup, **shape)
+    lists, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=True, **shape)
     variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
     area = tile_areas(setup, lists, width, height)
     fine_work = sample.stage(
@@ -67,7 +72,11 @@ def sampled_draw(
         lambda table: fine_streams(_started(table, simt), setup, len(lists.entries), width, height, samples),
         (area[lists.active],),
     )  # fmt: skip
-    return [setup_work, bin_work, tile_work, fine_work]
+    works = [setup_work, bin_work, tile_work, fine_work]
+    needed = facts["numSubtris"], bin_facts["num_bin_segments"], tile_facts["num_tile_segments"]
+    room = first_room(len(triangles), width, height).values()
+    failed = [works[:last] for last, (most, first) in enumerate(zip(needed, room, strict=True), 1) if most > first]
+    return Frame.numbers([*chain(*failed), *works], {"retries": len(failed)})
 
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:

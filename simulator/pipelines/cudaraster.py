@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from models.errors import TilestampError
 from models.simt import Simt
 from simulator.frame import Frame
-from simulator.pipelines._cudaraster_facts import Counters, add_counters, fine_counters, frame_facts, setup_counters
+from simulator.pipelines._cudaraster_facts import (
+    Counters,
+    add_counters,
+    fine_counters,
+    first_room,
+    frame_facts,
+    setup_counters,
+)
 from simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
 from simulator.pipelines._cudaraster_sampled import sampled_draw
 from simulator.sampler import Sampler
@@ -112,7 +119,7 @@ def cudaraster(
     positions = clip_positions(mesh, matrix)
     options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
     if sample is not None and batches == 1:
-        return Frame.numbers(sampled_draw(sample, positions, mesh.triangles, width, height, simt, options))
+        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options)
     colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
     state = _State(options, (width, height), simt, counting, colors)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
@@ -132,7 +139,11 @@ def cudaraster(
 
 
 def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.int32], first: int) -> None:
-    """One draw: the four stages, again from the start with larger buffers where one was too small."""
+    """One draw: the four stages, again from the start with larger buffers where one was too small.
+
+    A stage that overflows is executed to its end all the same, which the frame's works say; the kernels behind it
+    return at once.
+    """
     width, height = state.size
     release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
     depth, _, _, interpolate = MODES[mode]
@@ -144,12 +155,16 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
             positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
             depth=depth, interpolate=interpolate, capacity=state.capacity["numSubtris"],
         )  # fmt: skip
+        setup_work = replace(setup_work, variant=mode)
+        state.works.append(setup_work)
         if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
             continue
         queues, bin_work, bin_facts = bins.bin_raster(setup, **shape)
+        state.works.append(bin_work)
         if _grow(state, "numBinSegs", bin_facts["num_bin_segments"], 256):
             continue
         lists, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=clear, **shape)
+        state.works.append(tile_work)
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
@@ -158,8 +173,7 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
     variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
-    setup_work, fine_work = replace(setup_work, variant=mode), replace(fine_work, variant=variant)
-    state.works += [setup_work, bin_work, tile_work, fine_work]
+    state.works.append(replace(fine_work, variant=variant))
     if state.counting:
         drawn = int(np.count_nonzero(setup.subtriangles))
         counters = setup_counters(setup_work, fine_work, drawn, len(triangles)) | bin_facts["counters"]
@@ -170,11 +184,7 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
 
 def _initial_capacity(state: _State, triangles: int) -> None:
     """Room for a draw, as the original makes it: from the number of triangles, and never less than before."""
-    first = {
-        "numSubtris": triangles + SLACK,
-        "numBinSegs": bins.initial_capacity(triangles, *state.size),
-        "numTileSegs": tiles.initial_capacity(triangles, *state.size),
-    }
+    first = first_room(triangles, *state.size)
     state.capacity = {name: max(room, first[name]) for name, room in state.capacity.items()}
 
 
