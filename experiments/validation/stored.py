@@ -37,7 +37,9 @@ AS_PUBLISHED = "as_published"  # CudaRaster whose setup and bin raster copy thei
 WIDEST = {FREEPIPE: 1024, CUDARASTER: 2048}  # pixels: FreePipe on wider screens takes our counting minutes
 
 
-def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
+def compare(
+    folder: Path, machine: Machine, say: Say, *, inputs: Path | None = None, widest: int | None = None
+) -> "pd.DataFrame":
     """Predict what a folder of measurements holds.
 
     Parameters
@@ -47,6 +49,10 @@ def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
     machine : Machine
     say : callable
         Told what is being done.
+    inputs : Path, optional
+        Folder with the triangles (``ids``); by default the same.
+    widest : int, optional
+        Pixels: wider screens are left out.
 
     Returns
     -------
@@ -62,12 +68,13 @@ def compare(folder: Path, machine: Machine, say: Say) -> "pd.DataFrame":
     import pandas as pd
 
     rows: list[dict[str, Any]] = []
+    widths = {name: min(most, widest or most) for name, most in WIDEST.items()}
     if (folder / MICROPOLYGON).is_file():
         rows += _rows(read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
     if (folder / FREEPIPE).is_file():
-        rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say), machine)
+        rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say, widths[FREEPIPE], inputs), machine)
     if (folder / CUDARASTER).is_file():
-        rows += _rows(read(folder / CUDARASTER), _cudaraster(folder, machine, say), machine)
+        rows += _rows(read(folder / CUDARASTER), _cudaraster(folder, machine, say, widths[CUDARASTER], inputs), machine)
     if not rows:
         names = f"{MICROPOLYGON}, {FREEPIPE} or {CUDARASTER}"
         raise TilestampError(f"{folder} holds no measurements that we can predict: no {names} with inputs beside it")
@@ -79,6 +86,8 @@ def read(path: Path) -> dict[tuple[Any, ...], float]:
     import pandas as pd
 
     table = pd.read_csv(path)
+    if "metric" not in table:
+        table = _tall(table)
     missing = {"scene", "W", "kernel", "source", "metric", "value"} - set(table.columns)
     if missing:
         raise TilestampError(f"{path} lacks the columns {', '.join(sorted(missing))}")
@@ -92,6 +101,13 @@ def read(path: Path) -> dict[tuple[Any, ...], float]:
             table = table.assign(**{column: 0})
     index = [*KEYS, "metric"]
     return dict(zip(table[index].itertuples(index=False, name=None), table.value.astype(float), strict=True))
+
+
+def _tall(table: "pd.DataFrame") -> "pd.DataFrame":
+    """A row a metric, where a table has a row a launch and a column a metric."""
+    index = [name for name in (*KEYS, "H", "variant") if name in table]
+    tall = table.melt(id_vars=index, var_name="metric").dropna(subset="value")
+    return tall.assign(source=["cupti" if name == TIME_METRIC else "ncu_cold" for name in tall.metric])
 
 
 def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
@@ -108,34 +124,38 @@ def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tu
                     yield key, mix.launch(case.work, machine.sm.warp_size)
 
 
-def _freepipe(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+def _freepipe(
+    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None
+) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     mix = load_mix("freepipe", machine.compute_capability)
-    for key, work in freepipe_works(folder, machine, say):
+    for key, work in freepipe_works(folder, machine, say, widest, inputs):
         yield key, mix.launch(work, machine.sm.warp_size)
 
 
 def freepipe_works(
-    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[FREEPIPE]
+    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[FREEPIPE], inputs: Path | None = None
 ) -> Iterator[tuple[tuple[Any, ...], Work]]:
     """Kernels of every scene and size whose input is there, blind and reading first."""
-    for scene, source, width, height in _inputs(folder, FREEPIPE, widest):
+    for scene, source, width, height in _inputs(folder, FREEPIPE, widest, inputs):
         say(f"FreePipe: {scene} {width}x{height}")
         for kernel in ("freepipe", "freepipe_early"):
             works = _draw("freepipe", source, width, height, machine, early=kernel == "freepipe_early")
             yield (scene, width, 0, 0, kernel), works[0]
 
 
-def _cudaraster(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+def _cudaraster(
+    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None
+) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     mix = load_mix("cudaraster", machine.compute_capability)
-    for key, work in cudaraster_works(folder, machine, say):
+    for key, work in cudaraster_works(folder, machine, say, widest, inputs):
         yield key, mix.launch(work, machine.sm.warp_size)
 
 
 def cudaraster_works(
-    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[CUDARASTER]
+    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[CUDARASTER], inputs: Path | None = None
 ) -> Iterator[tuple[tuple[Any, ...], Work]]:
     """The four kernels of every scene and size whose input is there."""
-    for scene, source, width, height in _inputs(folder, CUDARASTER, widest):
+    for scene, source, width, height in _inputs(folder, CUDARASTER, widest, inputs):
         say(f"CudaRaster: {scene} {width}x{height}")
         for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
             yield (scene, width, 0, 0, work.kernel), work
@@ -151,10 +171,10 @@ def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine
     return [work for work in frame.works if isinstance(work, Work)]
 
 
-def _inputs(folder: Path, name: str, widest: int) -> Iterator[tuple[str, Path, int, int]]:
+def _inputs(folder: Path, name: str, widest: int, inputs: Path | None) -> Iterator[tuple[str, Path, int, int]]:
     """Scenes, their inputs and sizes, without those that lack an input or are too wide."""
     for scene, width, height in _sizes(folder / name):
-        source = folder / "ids" / f"{scene}_input.npz"
+        source = (inputs or folder) / "ids" / f"{scene}_input.npz"
         if width <= widest and source.is_file():
             yield scene, source, width, height
 
