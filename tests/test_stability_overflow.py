@@ -234,3 +234,11 @@ def test_normals_at_a_pole_are_noise_where_the_edge_is_a_few_roundings_long():
 @pytest.mark.parametrize(("length", "welded"), [(0.0, False), (2e-7, True)])
 def test_a_collapsed_edge_borrows_its_normal(length, welded):
     assert collapsed_edges.error(length, welded=welded) <= collapsed_edges.WRONG
+
+
+def test_the_first_retry_of_a_frame_is_what_its_first_attempt_took():
+    holds, breaks = (retries.frame(count) for count in (64, 65))
+    assert [run.frame.facts["retries"] for run in (holds, breaks)] == [0, 1]
+    tried = retries.attempt(65).works
+    for tables in zip(breaks.frame.works[:3], tried, strict=True):
+        assert np.array_equal(*(work.table for work in tables))
