@@ -42,6 +42,15 @@ class Run:
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
 
     @property
+    def counted(self) -> bool:
+        """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
+        return bool(self.options.get("counting", True))
+
+    def _check_counted(self) -> None:
+        if not self.counted:
+            raise TilestampError("nothing was counted, so there is no time; ask with counting=True")
+
+    @property
     def image(self) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) uint8, row 0 the top row."""
         return self._drawn(self.frame.image)
@@ -54,7 +63,7 @@ class Run:
     def _drawn(self, pixels: NDArray[Any]) -> NDArray[Any]:
         if pixels.size:
             return pixels
-        if self.sampled:
+        if self.error:
             raise TilestampError("a sampled run draws no picture; ask with error=0")
         raise TilestampError("only numbers were asked for; ask with picture=True")
 
@@ -66,6 +75,7 @@ class Run:
     @cached_property
     def launches(self) -> list[Launch | PipeLaunch]:
         """One for each kernel launch, in machine events."""
+        self._check_counted()
         if not any(isinstance(work, Work) for work in self.frame.works):  # fixed function alone needs no mix
             return [work.launch() for work in self.frame.works if isinstance(work, FixedFunctionWork)]
         return [self._launch(work) if isinstance(work, Work) else work.launch() for work in self.frame.works]
@@ -88,6 +98,7 @@ class Run:
     @cached_property
     def counts(self) -> dict[str, int]:
         """Every event of every stage, ``{"stage.EVENT": int}``."""
+        self._check_counted()
         counts: dict[str, int] = {}
         for work in self.frame.works:
             for name, count in work.counts().items():
@@ -108,11 +119,17 @@ class Run:
         an interval of no width.
         """
         parts: dict[tuple[str, str], list[Estimate]] = {}
-        for work, launch, timing in zip(self.frame.works, self.launches, self.timings, strict=True):
-            for name, estimate in self._intervals(work, launch, timing).items():
+        for work, found in zip(self.frame.works, self.launch_intervals, strict=True):
+            for name, estimate in found.items():
                 parts.setdefault((work.stage, name), []).append(estimate)
                 parts.setdefault(("frame", name), []).append(estimate)
         return {key: intervals.add(estimates) for key, estimates in parts.items()}
+
+    @cached_property
+    def launch_intervals(self) -> list[dict[str, Estimate]]:
+        """The numbers of ``intervals`` of each launch, in launch order."""
+        launches = zip(self.frame.works, self.launches, self.timings, strict=True)
+        return [self._intervals(work, launch, timing) for work, launch, timing in launches]
 
     def _intervals(self, work: Any, launch: Any, timing: Timing) -> dict[str, Estimate]:
         """Of one launch."""
@@ -128,7 +145,7 @@ class Run:
 
     def _ran(self, work: Work) -> Launch | None:
         """Price the units that ran, where not all did."""
-        if work.sample is None:
+        if work.sample is None or work.sample.complete:
             return None
         return self._launch(replace(work, table=work.sample.rows, streams=(), atomic_requests=None))
 

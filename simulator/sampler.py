@@ -19,6 +19,9 @@ from simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
+SMALLEST = (
+    60_000  # primitives of a frame; below, drawing a sample and pricing it costs more than running all (measured)
+)
 
 
 @dataclass
@@ -42,6 +45,11 @@ class Sampler:
     executed: dict[str, tuple[int, int]] = field(default_factory=dict)  # units run, and all, by kernel
     stages: int = 0  # so far
     seconds_saved: float = 0.0  # CPU seconds of the stages sampled, had all units cost alike by size
+    finish: dict[int, Callable[[Work], Work]] = field(default_factory=dict)  # of each sample, by its id: run the rest
+
+    def pays(self, primitives: int) -> bool:
+        """Whether a frame of so many sub-patches or triangles is worth a sample."""
+        return primitives >= SMALLEST
 
     def stage(
         self,
@@ -83,15 +91,37 @@ class Sampler:
             taken = enlarged(sample, self.measures(work, sample.rows), self.error) if left else strata.units
             sample = _grown(sample, taken, execute)
         spent = time.process_time() - begin
-        size = strata.known[:, 1]
-        ran, all_sizes = size[drawn(strata, sample.taken)].sum(), size.sum()
-        self.seconds_saved += spent * (all_sizes / ran - 1) if ran else 0.0
-        ran_before, all_before = self.executed.get(work.kernel, (0, 0))
-        self.executed[work.kernel] = ran_before + int(sample.taken.sum()), all_before + len(strata.order)
+        known = strata.known[:, 1]
+        ran, all_sizes = known[drawn(strata, sample.taken)].sum(), known.sum()
+        saved = spent * (all_sizes / ran - 1) if ran else 0.0
+        self._note(work.kernel, int(sample.taken.sum()), len(strata.order), saved)
         self.stages += 1
+
+        def finish(estimated: Work) -> Work:
+            """Run the units that are left."""
+            whole = _grown(sample, strata.units, execute)
+            self._note(work.kernel, int((strata.units - sample.taken).sum()), 0, -saved)
+            rows = expanded(whole)
+            return replace(estimated, table=rows, streams=streams(rows) or estimated.streams, sample=whole)
+
+        self.finish[id(sample)] = finish
         table = expanded(sample)
         grid = len(table) if work.dispatch == "blocks" else work.grid
         return replace(work, table=table, grid=grid, streams=streams(table), sample=sample)
+
+    def _note(self, kernel: str, ran: int, units: int, saved: float) -> None:
+        """Add to what was executed, of how many, and to the seconds saved."""
+        ran_before, units_before = self.executed.get(kernel, (0, 0))
+        self.executed[kernel] = ran_before + ran, units_before + units
+        self.seconds_saved += saved
+
+    def finished(self, work: Work) -> Work:
+        """Run all units of a stage of which part had run."""
+        if work.sample is None:
+            return work
+        whole = self.finish[id(work.sample)](work)
+        self.finish[id(work.sample)] = lambda _: whole  # a launch that is tried again is run once
+        return whole
 
     def precise(self, sample: Sample, work: Work) -> bool:
         """Whether all that the run asks for is known within the error."""

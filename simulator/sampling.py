@@ -114,6 +114,11 @@ class Sample:
     taken: Integers
     rows: Integers
 
+    @property
+    def complete(self) -> bool:
+        """Whether all units ran."""
+        return bool((self.taken == self.strata.units).all())
+
 
 def t_quantile(freedom: Floats) -> Floats:
     """Quantile of Student's t at 97.5 % (Cornish-Fisher, Abramowitz & Stegun 26.7.5; tabulated below 5)."""
@@ -241,6 +246,9 @@ def totals(sample: Sample, values: Floats) -> Totals:
     values : ndarray, (units that ran, k), float64
         Of each unit that ran, in the order of ``sample.rows``.
     """
+    if sample.complete:
+        none = np.zeros(values.shape[1])
+        return Totals(values.sum(axis=0), none, none + np.inf)
     fit = _fit(sample, values)
     units, first = sample.strata.units, int(sample.taken[0])
     rest = sample.strata.ordered[first:].sum(axis=0) @ fit.factors + (units[1:, None] * fit.mean[1:]).sum(axis=0)
@@ -291,14 +299,14 @@ def _smoothed(sample: Sample, fit: _Fit) -> Floats:
 def expanded(sample: Sample) -> Integers:
     """Rows of all units, (units, events): as executed, or as foretold, so that totals are the estimates."""
     strata, taken = sample.strata, sample.taken
+    table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
+    table[drawn(strata, taken)] = sample.rows
+    if sample.complete:
+        return table
     values = sample.rows.astype(np.float64)
     fit = _fit(sample, values)
     ran = np.zeros(len(strata.order), np.bool_)
     ran[_places(strata, taken)] = True
-    table = np.zeros((len(strata.order), values.shape[1]), np.int64)
-    table[drawn(strata, taken)] = np.rint(sample.rows)
-    if ran.all():
-        return table
     rows = strata.ordered[~ran] @ fit.factors + np.repeat(fit.mean, strata.units - taken, axis=0)
     np.maximum(rows, 0.0, out=rows)
     sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)

@@ -1,8 +1,11 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
+from dataclasses import replace
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from models.errors import TilestampError
 from models.machine import Machine, load_machine
@@ -77,20 +80,43 @@ def simulate(
     run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, options)
     draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, **options)
     note = scene.note
+    without_picture = {"picture": False} if takes(pipeline, "picture") else {}
     if error and takes(pipeline, "sample"):
         sampler = Sampler(error, seed, pipeline, machine)
-        frame = draw(sample=sampler)
-        sampled = run(frame, note, error, {"units": sampler.executed, "seconds_saved": sampler.seconds_saved})
-        if sampler.executed and _close(sampled):
-            return sampled
+        frame = draw(sample=sampler, **without_picture)
+        if sampler.executed:
+            facts = {"units": sampler.executed, "seconds_saved": sampler.seconds_saved}
+            return _escalated(run(frame, note, error, facts), sampler)
+        return run(frame, _joined(note, "everything ran: a sample would cost more"), error)
     if error:
-        note = "; ".join(filter(None, [note, f"everything ran: {pipeline} here cannot be sampled within {error:g}"]))
-    return run(draw(**{} if picture or not takes(pipeline, "picture") else {"picture": False}), note, error)
+        note = _joined(note, f"everything ran: {pipeline} cannot be sampled")
+    return run(draw(**{} if picture else without_picture), note, error)
 
 
-def _close(run: Run) -> bool:
-    """Whether a sample tells the frame's time within the error: where the tail decides, only all units do."""
-    return run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error
+def _joined(*notes: str) -> str:
+    return "; ".join(filter(None, notes))
+
+
+def _escalated(run: Run, sampler: Sampler) -> Run:
+    """Run all units of the launches, the least sure first, whose samples do not tell the frame's time within the error.
+
+    A stage whose tail decides is one: which unit meets which, only all units say.
+    """
+    if run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error:
+        return run
+    half = np.array([found["milliseconds"].half_width for found in run.launch_intervals])
+    order = np.argsort(-half)
+    left = np.cumsum(half[order][::-1] ** 2)[::-1]  # of the variance, before each is escalated
+    chosen = order[(left > (run.error * run.milliseconds) ** 2) & (half[order] > 0)]
+    works = list(run.frame.works)
+    for index in chosen:
+        works[index] = sampler.finished(works[index])
+    kernels = dict.fromkeys(works[index].kernel for index in sorted(chosen))
+    note = _joined(
+        run.note, f"all units ran of {', '.join(kernels)}: its tail decides, or part of it did not tell enough"
+    )
+    facts = run.sampled | {"seconds_saved": sampler.seconds_saved}
+    return replace(run, frame=replace(run.frame, works=works), note=note, sampled=facts)
 
 
 def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:

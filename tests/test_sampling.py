@@ -15,6 +15,12 @@ ERROR = 0.02
 MICRO = {"width": 320, "height": 240, "bound": 3}
 
 
+@pytest.fixture
+def small_frames(monkeypatch):
+    """Sample frames that are too small to be worth it."""
+    monkeypatch.setattr("simulator.sampler.SMALLEST", 1)
+
+
 def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:
     """Sizes and rows of units as unlike as those of a stage: (units,) and (units, 3)."""
     random = np.random.default_rng(len(kind))
@@ -127,6 +133,7 @@ def test_quantiles_of_t_are_those_of_the_tables():
     )
 
 
+@pytest.mark.usefixtures("small_frames")
 @pytest.mark.parametrize(
     ("pipeline", "machine", "options"),
     [("micropolygon", "gtx280", MICRO), ("cudaraster", "gtx480", {"width": 320, "height": 240})],
@@ -147,6 +154,7 @@ def test_sampled_blocks_do_exactly_what_they_do_in_the_full_run(pipeline, machin
     assert (work.sample.rows[:, same] == whole.table[ran][:, same]).all()
 
 
+@pytest.mark.usefixtures("small_frames")
 def test_every_number_of_a_sampled_run_has_its_interval():
     run = simulate("teapot", "micropolygon", "gtx280", error=0.3, **MICRO)
     assert run.sampled
@@ -165,12 +173,14 @@ def test_without_an_error_nothing_is_sampled_and_no_column_is_added():
     assert run.milliseconds_interval.half_width == 0
 
 
+@pytest.mark.usefixtures("small_frames")
 def test_a_sampled_run_says_that_it_has_no_picture():
     run = simulate("teapot", "micropolygon", "gtx280", error=0.3, fidelity="counts", **MICRO)
     with pytest.raises(TilestampError, match="a sampled run draws no picture; ask with error=0"):
         _ = run.image
 
 
+@pytest.mark.usefixtures("small_frames")
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others():
     first, again, other = (
         simulate(
@@ -189,10 +199,28 @@ def test_a_pipeline_that_cannot_be_sampled_runs_in_full_and_says_so():
     assert run.milliseconds_interval.half_width == 0
 
 
-def test_where_the_tail_decides_and_a_sample_cannot_tell_everything_runs():
+@pytest.mark.usefixtures("small_frames")
+def test_where_the_tail_decides_all_units_of_its_stage_run():
     options = {"width": 320, "height": 240}
-    run = simulate("teapot", "micropolygon", "gtx280", error=0.001, **options)
-    assert run.milliseconds == simulate("teapot", "micropolygon", "gtx280", **options).milliseconds
+    run = simulate("teapot", "micropolygon", "gtx280", error=0.01, **options)
+    full = simulate("teapot", "micropolygon", "gtx280", **options)
+    ran, units = run.sampled["units"]["tile_raster"]
+    assert ran == units
+    assert "all units ran of tile_raster" in run.note
+    assert (run.frame.works[-1].table == full.frame.works[-1].table).all()
+    assert run.milliseconds == pytest.approx(full.milliseconds, rel=run.error)
+    assert run.milliseconds_interval.relative <= run.error
+
+
+@pytest.mark.parametrize(("pipeline", "machine"), [("micropolygon", "gtx280"), ("cudaraster", "gtx480")])
+def test_a_frame_that_is_too_small_to_pay_for_a_sample_runs_in_full(pipeline, machine):
+    options = {"width": 160, "height": 120}
+    run = simulate("teapot", pipeline, machine, error=0.1, **options)
+    assert not run.sampled
+    assert "a sample would cost more" in run.note
+    assert run.milliseconds == simulate("teapot", pipeline, machine, picture=False, **options).milliseconds
+    with pytest.raises(TilestampError, match="ask with error=0"):
+        _ = run.image
 
 
 @pytest.mark.parametrize("error", [-0.1, 1.0, float("nan")])

@@ -65,6 +65,7 @@ def cudaraster(
     msaa: int = 1,
     mode: Mode = "depth",
     cull_backfaces: bool | None = None,
+    guard_band: bool | None = None,
     batches: int = 1,
     copy_parameters: bool = False,
     counting: bool = True,
@@ -91,6 +92,9 @@ def cudaraster(
         interpolation (the published sweep).
     cull_backfaces : bool or None
         None: as published, on in 1.1, off in nvdiffrast.
+    guard_band : bool or None
+        Leave triangles whole that leave the screen by less than 2048 pixels; None: on in 1.1, off in nvdiffrast, whose
+        copies differ: some have it on.
     batches : int
         Draws that the triangles are divided among; the first clears.
     copy_parameters : bool
@@ -117,8 +121,9 @@ def cudaraster(
         raise TilestampError(f"copy_parameters: release {release} does not copy them; nvdiffrast does")
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    options = {"release": release, "samples": msaa, "mode": mode, "cull_backfaces": cull_backfaces}
-    if sample is not None and batches == 1:
+    options: dict[str, Any] = {"release": release, "samples": msaa, "mode": mode}
+    options |= {"cull_backfaces": cull_backfaces, "guard_band": guard_band}
+    if sample is not None and batches == 1 and sample.pays(len(mesh.triangles)):
         return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options)
     colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
     state = _State(options, (width, height), simt, counting, colors)
@@ -153,7 +158,8 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     while True:
         setup, setup_work, facts = triangle_setup(
             positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
-            depth=depth, interpolate=interpolate, capacity=state.capacity["numSubtris"],
+            guard_band=state.options["guard_band"], depth=depth, interpolate=interpolate,
+            capacity=state.capacity["numSubtris"],
         )  # fmt: skip
         setup_work = replace(setup_work, variant=mode)
         state.works.append(setup_work)

@@ -114,7 +114,7 @@ def micropolygon(
         points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, near=near,
         min_depth=min_depth, wanted=boxes, sample=sample,
     )  # fmt: skip
-    if sample and boxes and len(subpatches.patch):
+    if sample and boxes and sample.pays(len(subpatches.patch)):
         options = {"spp": spp, "box_tests": box_tests, "edges": edges}
         view = matrix, width, height, simt
         rest = sampled_back_end(
