@@ -34,7 +34,7 @@ def run(progress: Callable[[str], None]) -> Result:
     with TemporaryDirectory() as folder:
         left_out = write_inputs(Path(folder))
         widest = int(os.environ.get(WIDTH, "2048"))
-        table = compare(MEASURED, load_machine("h200"), progress, inputs=Path(folder), widest=widest)
+        table = compare(MEASURED, load_machine("h200"), progress, inputs=Path(folder), widest=widest, guard_band=True)
     walls = table[table.quantity == WALL].ours
     table = table[table.quantity != WALL]
     kernels = by_kernel(table)

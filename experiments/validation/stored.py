@@ -38,7 +38,13 @@ WIDEST = {FREEPIPE: 1024, CUDARASTER: 2048}  # pixels: FreePipe on wider screens
 
 
 def compare(
-    folder: Path, machine: Machine, say: Say, *, inputs: Path | None = None, widest: int | None = None
+    folder: Path,
+    machine: Machine,
+    say: Say,
+    *,
+    inputs: Path | None = None,
+    widest: int | None = None,
+    guard_band: bool = False,
 ) -> "pd.DataFrame":
     """Predict what a folder of measurements holds.
 
@@ -53,6 +59,8 @@ def compare(
         Folder with the triangles (``ids``); by default the same.
     widest : int, optional
         Pixels: wider screens are left out.
+    guard_band : bool
+        Whether the CudaRaster that was measured leaves triangles whole that leave the screen by little.
 
     Returns
     -------
@@ -74,7 +82,11 @@ def compare(
     if (folder / FREEPIPE).is_file():
         rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say, widths[FREEPIPE], inputs), machine)
     if (folder / CUDARASTER).is_file():
-        rows += _rows(read(folder / CUDARASTER), _cudaraster(folder, machine, say, widths[CUDARASTER], inputs), machine)
+        rows += _rows(
+            read(folder / CUDARASTER),
+            _cudaraster(folder, machine, say, widths[CUDARASTER], inputs, guard_band=guard_band),
+            machine,
+        )
     if not rows:
         names = f"{MICROPOLYGON}, {FREEPIPE} or {CUDARASTER}"
         raise TilestampError(f"{folder} holds no measurements that we can predict: no {names} with inputs beside it")
@@ -144,20 +156,26 @@ def freepipe_works(
 
 
 def _cudaraster(
-    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None
+    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None, *, guard_band: bool
 ) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     mix = load_mix("cudaraster", machine.compute_capability)
-    for key, work in cudaraster_works(folder, machine, say, widest, inputs):
+    for key, work in cudaraster_works(folder, machine, say, widest, inputs, guard_band=guard_band):
         yield key, mix.launch(work, machine.sm.warp_size)
 
 
 def cudaraster_works(
-    folder: Path, machine: Machine, say: Say, widest: int = WIDEST[CUDARASTER], inputs: Path | None = None
+    folder: Path,
+    machine: Machine,
+    say: Say,
+    widest: int = WIDEST[CUDARASTER],
+    inputs: Path | None = None,
+    *,
+    guard_band: bool = False,
 ) -> Iterator[tuple[tuple[Any, ...], Work]]:
     """The four kernels of every scene and size whose input is there."""
     for scene, source, width, height in _inputs(folder, CUDARASTER, widest, inputs):
         say(f"CudaRaster: {scene} {width}x{height}")
-        for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast"):
+        for work in _draw("cudaraster", source, width, height, machine, release="nvdiffrast", guard_band=guard_band):
             yield (scene, width, 0, 0, work.kernel), work
             if work.kernel in COPYING:
                 yield (scene, width, 0, 0, f"{work.kernel} {VARIANT}"), with_parameter_copy(work)

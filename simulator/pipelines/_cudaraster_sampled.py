@@ -44,13 +44,14 @@ def sampled_draw(
         Pixels.
     simt : Simt
     options : dict
-        ``release``, ``samples``, ``mode`` and ``cull_backfaces``.
+        ``release``, ``samples``, ``mode``, ``cull_backfaces`` and ``guard_band``.
     """
     release, samples, mode = options["release"], options["samples"], options["mode"]
     depth, _, _, interpolate = MODES[mode]
     shape: dict[str, Any] = {"width": width, "height": height, "simt": simt, "release": release}
     prepare: Callable[..., Any] = partial(
         triangle_setup, positions, **shape, samples=samples, cull_backfaces=options["cull_backfaces"],
+        guard_band=options["guard_band"],
         depth=depth, interpolate=interpolate, capacity=MAX_SUBTRIANGLES,
     )  # fmt: skip
     setup, all_of_it, facts = prepare(triangles, counting=False)

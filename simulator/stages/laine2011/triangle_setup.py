@@ -124,6 +124,7 @@ def make_view(
     cull_backfaces: bool | None = None,
     depth: bool = True,
     interpolate: bool = True,
+    guard_band: bool | None = None,
 ) -> View:
     """Check the viewport and the switches of a draw, and put them in the form that kernels take."""
     if release not in SUBTRIANGLE_BYTES:
@@ -140,7 +141,7 @@ def make_view(
         scale_x=np.float32(8 * width),
         scale_y=np.float32(8 * height),
         log_samples=samples.bit_length() - 1,
-        guard_band=release == "1.1",
+        guard_band=release == "1.1" if guard_band is None else guard_band,
         cull_backfaces=release == "1.1" if cull_backfaces is None else cull_backfaces,
         depth=depth,
         interpolate=interpolate and release == "1.1",
@@ -174,6 +175,7 @@ def triangle_setup(
     cull_backfaces: bool | None = None,
     depth: bool = True,
     interpolate: bool = True,
+    guard_band: bool | None = None,
     counting: bool = True,
     capacity: int | None = None,
 ) -> tuple[Setup, Work, dict[str, Any]]:
@@ -195,6 +197,8 @@ def triangle_setup(
         None: as published, on in 1.1, off in nvdiffrast.
     depth, interpolate : bool
         Whether the depth plane and the attribute planes are needed.
+    guard_band : bool or None
+        Leave triangles whole that leave the screen by little; None: in 1.1.
     counting : bool
         Off: the work table stays empty.
     capacity : int or None
@@ -222,6 +226,7 @@ def triangle_setup(
         cull_backfaces=cull_backfaces,
         depth=depth,
         interpolate=interpolate,
+        guard_band=guard_band,
     )
     check_mesh(positions, triangles, release=release)
     F = len(triangles)
