@@ -9,6 +9,18 @@ from numpy.typing import NDArray
 
 from simulator.work import FixedFunctionWork, Work
 
+REMARKS = {  # a fact that counts what was lost, repeated or left to chance: the sentence about it
+    "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn",
+    "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
+    "wrong_pixels": "{:,} pixels show another micropolygon than without the mask",
+    "retries": "{:,} attempts to draw failed for want of room in a queue, and were repeated; the time includes them",
+    "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows hangs on the packing",
+    "mixed_pixels": "{:,} pixels mix the halves of two triangles' colours",
+    "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
+    "fragments lost beyond the kept ones": "{:,} fragments beyond those that a pixel can keep are lost",
+    "fragments beyond the stream's room": "{:,} fragments find no room in the original's stream",
+}
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -39,6 +51,13 @@ class Frame:
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The warnings, and a sentence for each fact that says of something lost, repeated or left to chance."""
+        return self.warnings + tuple(
+            sentence.format(self.facts[fact]) for fact, sentence in REMARKS.items() if self.facts.get(fact)
+        )
 
     @classmethod
     def numbers(cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any] | None = None) -> "Frame":

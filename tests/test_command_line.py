@@ -115,3 +115,31 @@ def test_a_map_that_the_pipeline_does_not_draw_leaves_no_picture_behind(tmp_path
     assert run_command(["render", "teapot", *SMALL, "--pipeline", "stamps", *output]) == BAD_INPUT
     assert "no map of quads" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_without_counting_there_is_a_picture_and_no_time(tmp_path, capsys):
+    options = ["render", "teapot", *SMALL, "-O", "counting=False"]
+    assert run_command(options) == BAD_INPUT
+    assert "nothing was counted, so there is no time" in capsys.readouterr().err
+    assert run_command([*options, "-o", str(tmp_path / "out.png")]) == 0
+    assert (tmp_path / "out.png").exists()
+    assert "nothing was counted, so there is no time" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--pipeline", "freepipe"], "several triangles at the nearest depth"),
+        (["--pipeline", "bit-mask", "-O", "group=2048"], "another micropolygon than without the mask"),
+    ],
+)
+def test_what_was_lost_or_left_to_chance_is_a_line_of_its_own(options, sentence, capsys):
+    assert run_command(["render", "teapot", *SMALL, *options]) == 0
+    assert any(sentence in line for line in capsys.readouterr().out.splitlines())
+    assert run_command(["render", "teapot", *SMALL, *options, "--json"]) == 0
+    assert any(sentence in warning for warning in json.loads(capsys.readouterr().out)["warnings"])
+
+
+def test_a_clean_frame_has_nothing_to_remark(capsys):
+    assert run_command(["render", "teapot", *SMALL, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["warnings"] == []

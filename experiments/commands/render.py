@@ -2,7 +2,6 @@
 
 import ast
 import json
-import math
 import os
 import re
 import sys
@@ -11,26 +10,12 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from experiments.commands.terminal import print_table, progress
+from experiments.commands.render_output import as_json, print_run, write_map, write_png
+from experiments.commands.terminal import progress
 from models.errors import TilestampError
 from simulator.run import Run
 
 MapName = Literal["quads", "tests", "ste", "overdraw", "atomics", "race"]
-SHOWN = {  # column of the terminal table: how to print it
-    "blocks": ",.0f",
-    "warps": ",.0f",
-    "instructions": ",.0f",
-    "simd_efficiency": ".3f",
-    "sample_tests": ",.0f",
-    "sample_hits": ",.0f",
-    "ste": ".4f",
-    "atomics": ",.0f",
-    "occupancy": ".2f",
-    "milliseconds": ".3f",
-    "bound": "s",
-    "fidelity": "s",
-    "why": "s",
-}
 
 
 def render(
@@ -118,8 +103,9 @@ def render(
     with progress(f"drawing {scene}") as say:
         asked = {"fidelity": fidelity, "error": error, "seed": seed, "picture": output is not None}
         run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked | options)
-        say("pricing")
-        stages = run.stages
+        if run.counted or output is None:  # without counts there is only a picture
+            say("pricing")
+            _ = run.stages
     if map_ is not None and output is not None:
         write_map(run, map_, output.with_suffix(f".{map_}.png"))
     if output is not None:
@@ -127,7 +113,7 @@ def render(
     if json_:
         sys.stdout.write(json.dumps(as_json(run)) + "\n")
     else:
-        _print_stages(run, stages, output)
+        print_run(run, output)
 
 
 def _simulate(
@@ -182,106 +168,3 @@ def _check_output(output: Path | None, map_: str | None) -> None:
         raise TilestampError(f"-o {output}: is a folder")
     if not os.access(output.parent, os.W_OK):
         raise TilestampError(f"-o {output}: the folder {output.parent} cannot be written to")
-
-
-def write_png(image: Any, path: Path) -> None:
-    """Write a picture, all of it or nothing."""
-    from PIL import Image
-
-    partial = path.with_suffix(".partial")
-    try:
-        Image.fromarray(image).save(partial, format="png")
-        partial.replace(path)
-    except OSError as error:
-        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def write_map(run: Run, name: str, path: Path) -> None:
-    """Draw a counter's heat map."""
-    from reports.heatmap import heat_map
-
-    if name not in run.frame.maps:
-        raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
-    title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
-    counts = run.frame.maps[name]
-    unit = f"{name} a {'pixel' if counts.shape == (run.height, run.width) else 'tile'}"
-    heat_map(counts, path, title=title, unit=unit, width=run.width, height=run.height)
-
-
-def as_json(run: Run) -> dict[str, Any]:
-    """The run as plain data; not-a-number becomes null."""
-    stages = run.stages.astype(object).to_dict(orient="index")
-    return {
-        "scene": run.scene,
-        "note": run.note,
-        "pipeline": run.pipeline,
-        "machine": run.machine.name,
-        "width": run.width,
-        "height": run.height,
-        "fidelity": run.fidelity,
-        "options": run.options,
-        "milliseconds": run.milliseconds,
-        **_sampling(run),
-        "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
-        "counts": run.counts,
-        "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
-        "warnings": list(run.frame.warnings),
-    }
-
-
-def _sampling(run: Run) -> dict[str, Any]:
-    """What was sampled, and the intervals; nothing for a run that executed everything."""
-    if not run.sampled:
-        return {}
-    return {
-        "error": run.error,
-        "sampled": _plain(run.sampled),
-        "intervals": {f"{stage}.{name}": list(estimate) for (stage, name), estimate in run.intervals.items()},
-    }
-
-
-def _plain(value: Any) -> Any:
-    """NumPy scalars and containers as JSON knows them."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    value = value.tolist() if hasattr(value, "tolist") else value
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _print_stages(run: Run, stages: Any, output: Path | None) -> None:
-    """Print the table of stages and a line of what was written."""
-    columns = {name: kind for name, kind in SHOWN.items() if name in stages}
-    rows = [
-        [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
-        for stage, row in stages[list(columns)].to_dict(orient="index").items()
-    ]
-    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {_shown_time(run)}"
-    print_table(title, ["stage", *columns], rows)
-    for line in filter(
-        None, [run.note, *run.frame.warnings, _shown_sample(run), f"picture: {output}" if output else ""]
-    ):
-        sys.stdout.write(line + "\n")
-
-
-def _shown_time(run: Run) -> str:
-    """Show the frame's milliseconds, with their interval where the run was sampled."""
-    if not run.sampled:
-        return f"{run.milliseconds:.2f} ms"
-    return f"{run.milliseconds:.2f} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
-
-
-def _shown_sample(run: Run) -> str:
-    """Say which part was executed, and how sure the main numbers are."""
-    if not run.sampled:
-        return ""
-    parts = ", ".join(f"{ran} of {units} units of {kernel}" for kernel, (ran, units) in run.sampled["units"].items())
-    wide = ", ".join(
-        f"{name.replace('_', ' ')} {100 * estimate.relative:.2g} %"
-        for (stage, name), estimate in run.intervals.items()
-        if stage == "frame"
-    )
-    return f"executed: {parts}\n95 % intervals of the frame, half-width: {wide}"

@@ -1,0 +1,130 @@
+"""What ``tilestamp render`` leaves: a picture, a heat map, the table of stages or the run as JSON."""
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from experiments.commands.terminal import print_table
+from models.errors import TilestampError
+from simulator.run import Run
+
+SHOWN = {  # column of the terminal table: how to print it
+    "blocks": ",.0f",
+    "warps": ",.0f",
+    "instructions": ",.0f",
+    "simd_efficiency": ".3f",
+    "sample_tests": ",.0f",
+    "sample_hits": ",.0f",
+    "ste": ".4f",
+    "atomics": ",.0f",
+    "occupancy": ".2f",
+    "milliseconds": ".3f",
+    "bound": "s",
+    "fidelity": "s",
+    "why": "s",
+}
+
+
+def write_png(image: Any, path: Path) -> None:
+    """Write a picture, all of it or nothing."""
+    from PIL import Image
+
+    partial = path.with_suffix(".partial")
+    try:
+        Image.fromarray(image).save(partial, format="png")
+        partial.replace(path)
+    except OSError as error:
+        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_map(run: Run, name: str, path: Path) -> None:
+    """Draw a counter's heat map."""
+    from reports.heatmap import heat_map
+
+    if name not in run.frame.maps:
+        raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
+    title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
+    counts = run.frame.maps[name]
+    unit = f"{name} a {'pixel' if counts.shape == (run.height, run.width) else 'tile'}"
+    heat_map(counts, path, title=title, unit=unit, width=run.width, height=run.height)
+
+
+def as_json(run: Run) -> dict[str, Any]:
+    """The run as plain data; not-a-number becomes null."""
+    stages = run.stages.astype(object).to_dict(orient="index") if run.counted else {}
+    return {
+        "scene": run.scene,
+        "note": run.note,
+        "pipeline": run.pipeline,
+        "machine": run.machine.name,
+        "width": run.width,
+        "height": run.height,
+        "fidelity": run.fidelity,
+        "options": run.options,
+        "milliseconds": run.milliseconds if run.counted else None,
+        **_sampling(run),
+        "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
+        "counts": run.counts if run.counted else {},
+        "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
+        "warnings": list(run.frame.remarks),
+    }
+
+
+def _sampling(run: Run) -> dict[str, Any]:
+    """What was sampled, and the intervals; nothing for a run that executed everything."""
+    if not run.sampled:
+        return {}
+    return {
+        "error": run.error,
+        "sampled": _plain(run.sampled),
+        "intervals": {f"{stage}.{name}": list(estimate) for (stage, name), estimate in run.intervals.items()},
+    }
+
+
+def _plain(value: Any) -> Any:
+    """NumPy scalars and containers as JSON knows them."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_run(run: Run, output: Path | None) -> None:
+    """Print the table of stages, and a line for all else that is to be said."""
+    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}"
+    if run.counted:
+        columns = {name: kind for name, kind in SHOWN.items() if name in run.stages}
+        rows = [
+            [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
+            for stage, row in run.stages[list(columns)].to_dict(orient="index").items()
+        ]
+        print_table(f"{title}: {_shown_time(run)}", ["stage", *columns], rows)
+    else:
+        sys.stdout.write(f"{title}: nothing was counted, so there is no time\n")
+    lines = [run.note, *run.frame.remarks, _shown_sample(run), f"picture: {output}" if output else ""]
+    sys.stdout.writelines(f"{line}\n" for line in lines if line)
+
+
+def _shown_time(run: Run) -> str:
+    """Show the frame's milliseconds, with their interval where the run was sampled."""
+    if not run.sampled:
+        return f"{run.milliseconds:.2f} ms"
+    return f"{run.milliseconds:.2f} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
+
+
+def _shown_sample(run: Run) -> str:
+    """Say which part was executed, and how sure the main numbers are."""
+    if not run.sampled:
+        return ""
+    parts = ", ".join(f"{ran} of {units} units of {kernel}" for kernel, (ran, units) in run.sampled["units"].items())
+    wide = ", ".join(
+        f"{name.replace('_', ' ')} {100 * estimate.relative:.2g} %"
+        for (stage, name), estimate in run.intervals.items()
+        if stage == "frame"
+    )
+    return f"executed: {parts}\n95 % intervals of the frame, half-width: {wide}"
