@@ -51,15 +51,6 @@ class Run:
             raise TilestampError("nothing was counted, so there is no time; ask with counting=True")
 
     @property
-    def counted(self) -> bool:
-        """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
-        return bool(self.options.get("counting", True))
-
-    def _check_counted(self) -> None:
-        if not self.counted:
-            raise TilestampError("nothing was counted, so there is no time; ask with counting=True")
-
-    @property
     def image(self) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) uint8, row 0 the top row."""
         return self._drawn(self.frame.image)
@@ -85,7 +76,6 @@ class Run:
     def launches(self) -> list[Launch | PipeLaunch]:
         """One for each kernel launch, in machine events."""
         self._check_counted()
-        self._check_counted()
         if not any(isinstance(work, Work) for work in self.frame.works):  # fixed function alone needs no mix
             return [work.launch() for work in self.frame.works if isinstance(work, FixedFunctionWork)]
         return [self._launch(work) if isinstance(work, Work) else work.launch() for work in self.frame.works]
@@ -108,7 +98,6 @@ class Run:
     @cached_property
     def counts(self) -> dict[str, int]:
         """Every event of every stage, ``{"stage.EVENT": int}``."""
-        self._check_counted()
         self._check_counted()
         counts: dict[str, int] = {}
         for work in self.frame.works:
