@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 from reports.style import HEAT, figure
 
 
-def heat_map(counts: NDArray[Any], path: Path, *, title: str, unit: str, width: int, height: int) -> None:
+def heat_map(
+    counts: NDArray[Any],
+    path: Path,
+    *,
+    title: str,
+    unit: str,
+    size: tuple[int, int],
+    tile: int = 1,
+    from_below: bool = False,
+) -> None:
     """Draw ``counts`` over the screen with a colour bar.
 
     Parameters
@@ -20,15 +29,32 @@ def heat_map(counts: NDArray[Any], path: Path, *, title: str, unit: str, width: 
         PNG to write.
     unit : str
         What a cell counts.
-    width, height : int
-        Of the screen in pixels: the axes.
+    size : tuple of int
+        Width and height of the screen in pixels: the axes.
+    tile : int
+        Pixels on a side of a cell. What of the cells lies outside the screen is not shown.
+    from_below : bool
+        Whether the cells begin at the bottom of the screen.
     """
-    with figure(path, title, figsize=(8, 6.4 * height / width + 1.0)) as axes:
+    with figure(path, title, figsize=(8, 6.4 * size[1] / size[0] + 1.0)) as axes:
         shown = np.ma.masked_invalid(np.asarray(counts, np.float64))
         top = float(np.quantile(shown.compressed(), 0.999)) if shown.count() else 1.0
         image = axes.imshow(
-            shown, cmap=HEAT, vmin=0, vmax=top or 1.0, extent=(0, width, height, 0), interpolation="nearest"
+            shown,
+            cmap=HEAT,
+            vmin=0,
+            vmax=top or 1.0,
+            extent=extent(counts.shape, size[1], tile, from_below=from_below),
+            interpolation="nearest",
         )
+        axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
         axes.grid(visible=False)
         axes.set(xlabel="x [pixels]", ylabel="y [pixels]")
         axes.figure.colorbar(image, ax=axes, label=unit, shrink=0.9, extend="max")
+
+
+def extent(cells: tuple[int, ...], height: int, tile: int, *, from_below: bool) -> tuple[int, int, int, int]:
+    """Left, right, bottom and top of a map of (rows, columns) cells, in pixels from the screen's top left corner."""
+    rows, columns = tile * cells[0], tile * cells[1]
+    top = height - rows if from_below else 0
+    return 0, columns, top + rows, top

@@ -37,11 +37,15 @@ class Frame:
     triangle_ids : ndarray, (H, W), int32, or None
         Input index of the visible triangle, -1 where nothing was drawn.
     maps : dict of str to ndarray
-        Heat maps by counter, a cell a tile or a pixel.
+        Heat maps by counter, a cell a tile or a pixel; row 0 on top.
     facts : dict
         What a report may say besides: queue lengths, memory, retries, what was given up.
     warnings : tuple of str
         Sentences on what the picture lacks or shows wrong.
+    tile : int
+        Pixels on a side of a tile, for maps that have a cell a tile.
+    tiles_from_below : bool
+        Whether tiles begin at the bottom row: a height that is no multiple of theirs then cuts the top row.
     """
 
     image: NDArray[np.uint8]
@@ -51,6 +55,8 @@ class Frame:
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    tile: int = 1
+    tiles_from_below: bool = False
 
     @property
     def remarks(self) -> tuple[str, ...]:

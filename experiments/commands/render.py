@@ -15,8 +15,6 @@ from experiments.commands.terminal import progress
 from models.errors import TilestampError
 from simulator.run import Run
 
-MapName = Literal["quads", "tests", "ste", "overdraw", "atomics", "race"]
-
 
 def render(
     scene: str,
@@ -29,7 +27,7 @@ def render(
     error: float = 0.0,
     seed: int = 0,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
-    map_: Annotated[MapName | None, Parameter(name="--map")] = None,
+    map_: Annotated[str | None, Parameter(name="--map")] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     tile: int | None = None,
     spp: int | None = None,
@@ -67,7 +65,7 @@ def render(
     output
         PNG file for the picture.
     map_
-        Also write a heat map of this counter, beside the picture; which there are depends on the pipeline.
+        Also write a heat map of this counter beside the picture, as tests; each pipeline has its own.
     json_
         Print one JSON object instead of tables.
     tile

@@ -48,8 +48,11 @@ def write_map(run: Run, name: str, path: Path) -> None:
         raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
     title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
     counts = run.frame.maps[name]
-    unit = f"{name} a {'pixel' if counts.shape == (run.height, run.width) else 'tile'}"
-    heat_map(counts, path, title=title, unit=unit, width=run.width, height=run.height)
+    by_pixel = counts.shape == (run.height, run.width)
+    unit = f"{name} a {'pixel' if by_pixel else 'tile'}"
+    tile, from_below = (1, False) if by_pixel else (run.frame.tile, run.frame.tiles_from_below)
+    size = run.width, run.height
+    heat_map(counts, path, title=title, unit=unit, size=size, tile=tile, from_below=from_below)
 
 
 def as_json(run: Run) -> dict[str, Any]:

@@ -87,8 +87,7 @@ def run(progress: Progress) -> Result:
                 path,
                 title=f"Share of {SEEDS} runs in which a pixel is wrong, {SHOWN} layers",
                 unit="share of the runs",
-                width=SIZE,
-                height=SIZE,
+                size=(SIZE, SIZE),
             ),
         ),
         Figure(

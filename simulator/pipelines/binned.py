@@ -12,6 +12,7 @@ from simulator.pipelines.tiled import check_choices
 from simulator.scenes.scene import Scene
 from simulator.scenes.texture import TILE, texture_chains
 from simulator.scenes.textured_mesh import geometry
+from simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
 from simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
 from simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
@@ -113,4 +114,6 @@ def binned(
             "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
             "holes": resolve.total(RopEvent.HOLES),
         },
+        tile=SCREEN_TILE,
+        tiles_from_below=True,
     )

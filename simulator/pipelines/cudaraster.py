@@ -27,6 +27,7 @@ from simulator.sampler import Sampler
 from simulator.scenes.scene import Scene
 from simulator.stages.laine2011 import bin_raster as bins
 from simulator.stages.laine2011 import coarse_raster as tiles
+from simulator.stages.laine2011.coverage import TILE
 from simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from simulator.stages.laine2011.triangle_setup import SLACK, Release, triangle_setup
@@ -139,7 +140,14 @@ def cudaraster(
     image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
     facts = frame_facts(state.counters, state.needed, release, state.retries)
     return Frame(
-        image, state.buffers.depth[shown, :height, :width][::-1], state.works, ids, maps=state.maps, facts=facts
+        image,
+        state.buffers.depth[shown, :height, :width][::-1],
+        state.works,
+        ids,
+        maps=state.maps,
+        facts=facts,
+        tile=TILE,
+        tiles_from_below=True,
     )
 
 

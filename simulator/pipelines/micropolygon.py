@@ -151,7 +151,7 @@ def micropolygon(
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
     facts = _facts(subpatches, len(lists))
-    return Frame(image, depth, works, maps=maps, facts=facts) if picture else Frame.numbers(works, facts)
+    return Frame(image, depth, works, maps=maps, facts=facts, tile=tile) if picture else Frame.numbers(works, facts)
 
 
 def _maps(

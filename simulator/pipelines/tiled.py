@@ -102,6 +102,7 @@ def tiled(
             "launches that the host waits for": waits,
         },
         warnings=not_drawn(dropped) + _overflow(lost, int(sizes.sum())),
+        tile=tile,
     )
 
 
