@@ -35,25 +35,13 @@ EXCESS = 1.15  # times the largest term: from here on balance or tail is what ho
 
 
 def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
-    """Price one launch by playing its units on the SMs.
-
-    Parameters
-    ----------
-    launch : Launch
-    machine : Machine
-    moved : Traffic
-        Its bytes, from ``models.traffic``.
+    """Price one launch by playing its units on the SMs; parameters and errors as of ``asked_of``.
 
     Returns
     -------
     Timing
         Never below ``bounds``. ``details`` has ``busy_sms`` (SMs that got a unit) and ``tail_cycles`` (from the start
         of the last unit to the end).
-
-    Raises
-    ------
-    TilestampError
-        A block that the machine cannot launch.
     """
     asked = asked_of(launch, machine, moved)
     return played(asked, loads(asked))

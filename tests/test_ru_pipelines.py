@@ -22,23 +22,12 @@ from simulator.stages.ru2016.tile_lists_fill import overlaps
 from simulator.stages.ru2016.tiled_raster import Visible
 from simulator.stages.ru2016.vertex_shading import vertex_shading
 from tests import naive_textured as naive
+from tests.textured_soup import soup
 
 WIDTH, HEIGHT = 61, 47  # no multiples of a tile
 SIMT = Simt(coalescing=2, atomic_merge=0, sms=2)
 CAMERA = LookAt((0, 0, 4), (0, 0, 0), fov_degrees=45)
 NEAR_EDGE = 1e-4  # barycentric: float32 may decide otherwise here
-
-
-def soup(seed=3, count=40):
-    rng = np.random.default_rng(seed)
-    centers = rng.uniform(-1.2, 1.2, (count, 1, 3))
-    points = centers + rng.uniform(-0.6, 0.6, (count, 3, 3))
-    positions = np.concatenate([points.reshape(-1, 3), np.ones((3 * count, 1))], axis=1).astype(np.float32)
-    triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
-    texture = rng.integers(0, 256, (8, 8, 4), dtype=np.uint8)
-    uvs = rng.uniform(-1, 2, (3 * count, 2)).astype(np.float32)
-    ids = np.zeros(count, np.int32)
-    return Scene("soup", mesh=Mesh(positions, triangles, uvs=uvs, texture_ids=ids, textures=(texture,)))
 
 
 @pytest.fixture(scope="module")

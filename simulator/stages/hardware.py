@@ -125,8 +125,6 @@ def hardware(
         raise TilestampError(f"bits {bits}: hardware snaps to 4 to 8 sub-pixel bits")
     if depth_format not in DEPTHS:
         raise TilestampError(f"depth_format {depth_format}: hardware has {', '.join(get_args(DepthFormat))}")
-    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
-        raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     pieces = make_pieces(positions, triangles, width, height, bits)
     depths = DEPTHS[depth_format]
     ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), depths.far, np.uint32)

@@ -161,7 +161,7 @@ def freepipe(
     TilestampError
         For an option that does not exist, or an index out of range.
     """
-    _check(positions, triangles, width, height, packing, early, block, simt)
+    _check(width, height, packing, early, block, simt)
     pieces = make_pieces(positions, triangles, width, height)
     if colors is None:
         colors = ((np.arange(len(triangles)) + 1) & 0xFFFFFF).astype(np.uint32)
@@ -180,8 +180,6 @@ def freepipe(
 
 
 def _check(
-    positions: NDArray[np.float32],
-    triangles: NDArray[np.int32],
     width: int,
     height: int,
     packing: str,
@@ -199,8 +197,6 @@ def _check(
         raise TilestampError(f"freepipe: warps of {simt.warp} lanes are not supported, only {WARP}")
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise TilestampError(f"size {width}x{height}: freepipe draws 1 to {MAX_SIDE} pixels in each direction")
-    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
-        raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
 
 
 def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: NDArray[np.uint32]) -> FreePipeFrame:

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from models.errors import TilestampError
 from simulator.parallel import for_parts, parts_of
 from simulator.stages.laine2011.exact import fma, round_to_int32
 
@@ -201,12 +202,18 @@ def make_pieces(
     positions : ndarray, (V, 4), float32
         Clip space.
     triangles : ndarray, (F, 3), int32
-        Indices, all in range.
     width, height : int
         Pixels.
     bits : int
         Sub-pixel bits of the snapped corners.
+
+    Raises
+    ------
+    TilestampError
+        For an index out of range.
     """
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
+        raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     parts = parts_of(len(triangles), _PART_TRIANGLES)
     kind, count = np.zeros(len(triangles), np.uint8), np.zeros(len(triangles), np.int64)
     for_parts(_classify_part, parts, positions, triangles, kind, count)
