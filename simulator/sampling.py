@@ -20,11 +20,16 @@ from numpy.typing import NDArray
 CERTAIN = 24  # largest units, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum
 FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
-ENOUGH = 12  # units that ran for each thing known, before rows are predicted by them
+ENOUGH = 16  # units that ran for each thing known, before rows are predicted by them
+FEWEST_KNOWN = 2  # things: 1, and the size
 PILOT = 96  # units that the first sample draws in proportion to size, and ...
 PILOT_EACH = 5  # ... at least from each stratum
 PRIOR = 1.0  # degrees of freedom that the spread usual in other strata counts for
 GENEROUS = 1.15  # of the units that the error seems to ask for: a spread is itself an estimate
+MOST_PULL = 0.9  # of one unit on its own prediction, as the spread takes it
+RARE = 0.15  # of what it does, by which one unit that was not seen may deviate (assumed), where ...
+ALIKE = 0.01  # (relative) nearly all units do what is foretold, which is ...
+MOSTLY = 0.9  # of them
 _QUANTILES = np.array([12.706, 4.303, 3.182, 2.776])  # of t at 97.5 %, for 1 to 4 degrees of freedom
 _Z = 1.959964
 
@@ -196,6 +201,7 @@ class _Fit:
 
     factors: Floats  # (p, k): rows are predicted as what is known times these
     residual: Floats  # (units that ran, k) less the prediction
+    apart: Floats  # (units that ran, k) from the stratum's mean residual, had the unit not been in the fit (jackknife)
     mean: Floats  # (strata, k) of the residuals
     spread: Floats  # (strata, k) their variance
     weight: Floats  # (strata,) variance of a total by unit variance: N^2 (1 - n / N) / n
@@ -205,27 +211,31 @@ class _Fit:
 def _fit(sample: Sample, values: Floats) -> _Fit:
     strata, taken = sample.strata, sample.taken
     known = strata.ordered[_places(strata, taken)]
-    factors, freedom = _factors(sample, known, values)
+    factors, leverage = _factors(sample, known, values)
     residual = values - known @ factors
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
     some = np.maximum(taken, 1)[:, None]
     mean = _reduce(residual, starts, taken) / some
-    squares = _reduce((residual - np.repeat(mean, taken, axis=0)) ** 2, starts, taken)
-    spread = squares / np.maximum(taken - 1, 1)[:, None] * freedom
+    apart = (residual - np.repeat(mean, taken, axis=0)) / (1 - leverage)[:, None]
+    spread = _reduce(apart**2, starts, taken) / np.maximum(taken - 1, 1)[:, None]
     weight = strata.units * (strata.units - taken) / some[:, 0]
-    return _Fit(factors, residual, mean, spread, weight, taken)
+    return _Fit(factors, residual, apart, mean, spread, weight, taken)
 
 
-def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, float]:
-    """Least squares of rows on what is known, without the certainty stratum; and what the fit takes from the spread."""
+def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Least squares of rows on what is known, but for the certainty stratum; and how much each row pulls its fit."""
     taken, first = sample.taken, int(sample.taken[0])
-    n, p = len(values) - first, known.shape[1]
-    if n < ENOUGH * p:
-        return np.zeros((p, values.shape[1])), 1.0
+    factors, leverage = np.zeros((known.shape[1], values.shape[1])), np.zeros(len(values))
+    used = (len(values) - first) // ENOUGH
+    if used < FEWEST_KNOWN:
+        return factors, leverage
     weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
-    weighted = (known[first:] * weight[:, None]).T
-    factors: Floats = np.linalg.pinv(weighted @ known[first:], hermitian=True) @ (weighted @ values[first:])
-    return factors, n / (n - p)
+    some = known[first:, :used]
+    weighted = (some * weight[:, None]).T
+    inverse = np.linalg.pinv(weighted @ some, hermitian=True)
+    factors[: some.shape[1]] = inverse @ (weighted @ values[first:])
+    leverage[first:] = np.minimum(((some @ inverse) * weighted.T).sum(axis=1), MOST_PULL)
+    return factors, leverage
 
 
 def _reduce(values: Floats, starts: Integers, taken: Integers) -> Floats:
@@ -257,7 +267,30 @@ def totals(sample: Sample, values: Floats) -> Totals:
     variance = part.sum(axis=0)
     below = (part**2 / np.maximum(fit.taken - 1 + PRIOR, 1)[:, None]).sum(axis=0)
     freedom = np.where(below > 0, variance**2 / np.where(below > 0, below, 1.0), np.inf)
-    return Totals(value, variance, freedom)
+    unseen, few = _rare(sample, values, fit)
+    return Totals(value, variance + unseen, np.minimum(freedom, few))
+
+
+def _rare(sample: Sample, values: Floats, fit: _Fit) -> tuple[Floats, Floats]:
+    """Account for deviations that few units have: variance by those not seen, and degrees of freedom by those seen.
+
+    Where nearly all units that ran are alike, one more is taken to deviate by ``RARE`` of what it does. Where few units
+    make up the spread, it is as sure as that of few: the variance of a variance by the fourth moment.
+    """
+    taken = sample.taken
+    partly = np.repeat(taken < sample.strata.units, taken)[:, None]
+    share = np.repeat(sample.strata.units / np.maximum(taken, 1), taken)[:, None] * partly
+    square = (share * fit.apart) ** 2
+    second, fourth = square.sum(axis=0), (square**2).sum(axis=0)
+    carriers = second**2 / np.where(fourth > 0, fourth, 1.0)  # units that make up the spread; a third if normal
+    n = max(int(partly.sum()), 1)
+    few = np.where(fourth > 0, 2 / np.maximum(1 / np.maximum(carriers, 1.0) - 1 / n, 1e-9), np.inf)
+    does = share * np.abs(values)
+    alike = np.abs(share * fit.residual) <= ALIKE * does
+    units = (does > 0).sum(axis=0)
+    rare = (alike & (does > 0)).sum(axis=0) >= MOSTLY * units
+    unseen = np.where(rare, (RARE**2 * does**2).sum(axis=0) / np.maximum(units, 1), 0.0)
+    return unseen, few
 
 
 def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
