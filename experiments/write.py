@@ -1,4 +1,4 @@
-"""Write a result: tidy CSV, a manifest, plots; and one page over all results."""
+"""Write a result: tidy CSV, a manifest, plots; one page over all results; and one table of all boundaries."""
 
 import json
 import platform
@@ -7,15 +7,19 @@ import tempfile
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from experiments.registry import describe_folder
 from experiments.result import Cell, Result
 from models.compile_cache import source_digest
 from reports.page import write_page
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 PACKAGES = ("numpy", "numba", "pandas", "matplotlib", "trimesh")
 SCRATCH = ".partial-"  # first letters of a folder that is being written
+BOUNDARIES = "boundaries"  # a table of results of the stability atlas
 COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim")
 
 
@@ -84,8 +88,51 @@ def write_index(results: Sequence[Result], folder: Path) -> Path:
         "nothing and is never averaged; a predicted one had none. Red: outside the aim."
     )
     footer = f"tilestamp {version('tilestamp')}, sources {source_digest()}"
-    write_page(path, "tilestamp: papers beside the model", introduction, [_section(r) for r in results], footer)
+    sections = [_section(result) for result in results]
+    for group, table in boundary_tables(results).items():
+        table.to_csv(folder / f"{group}.csv", index=False)
+        first = next(section for section in sections if section["group"] == group)
+        first["overview"] = _overview(group, table)
+    write_page(path, "tilestamp: papers beside the model", introduction, sections, footer)
     return path
+
+
+def boundary_tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
+    """All boundaries of each folder of experiments that has any, with the experiment that each was found by."""
+    import pandas as pd
+
+    groups: dict[str, list[pd.DataFrame]] = {}
+    for result in results:
+        if BOUNDARIES in result.tables:
+            table = result.tables[BOUNDARIES].copy()
+            table.insert(0, "experiment", result.name)
+            groups.setdefault(_group(result), []).append(table)
+    return {group: pd.concat(tables, ignore_index=True) for group, tables in groups.items()}
+
+
+def _overview(group: str, table: "pd.DataFrame") -> dict[str, Any]:
+    """All boundaries of a folder for the page: a row is the section that it is from, and texts."""
+    ends = {"holds", "breaks"}
+    columns = ["method", "parameter", "holds", "breaks", "unit", "wrong", "cure", "cost"]
+    records = table.to_dict(orient="records")
+    return {
+        "name": group,
+        "title": f"{describe_folder(group).split(':')[0]}: {len(table)} boundaries at one glance",
+        "file": f"{group}.csv",
+        "columns": columns,
+        "rows": [
+            {
+                "section": str(row["experiment"]).replace("/", "-"),
+                "cells": [_end(row[name]) if name in ends else row[name] for name in columns],
+            }
+            for row in records
+        ],
+    }
+
+
+def _end(value: float | None) -> str:
+    """A value that holds, or one that breaks."""
+    return "none tried" if value is None or value != value else _number(value)  # noqa: PLR0124 - not-a-number
 
 
 def _section(result: Result) -> dict[str, Any]:

@@ -16,14 +16,22 @@ TEMPLATE = """<!doctype html>
  tr.fitted td { color: #888; font-style: italic; } tr.missed td.error { color: #b00020; font-weight: 600; }
  nav ul { margin: .2rem 0 .8rem; padding-left: 1.2rem; } nav p { margin: .2rem 0; } a { color: #1f5aa6; }
  img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
+ table.overview td, table.overview th { text-align: left; vertical-align: top; border-bottom: 1px solid #eee; }
  footer { color: #777; font-size: 12px; margin-top: 3rem; }
 </style></head><body>
 <h1>{{ title }}</h1>
 <p>{{ introduction }}</p>
 <nav>{% for group in results | groupby("group") %}<p><b>{{ group.list[0].about }}</b></p><ul>
-{% for result in group.list %}
+{% for result in group.list %}{% if result.overview %}
+<li><a href="#{{ result.overview.name }}">{{ result.overview.title }}</a></li>{% endif %}
 <li><a href="#{{ result.name }}">{{ result.title }}</a></li>{% endfor %}</ul>{% endfor %}</nav>
-{% for result in results %}
+{% for result in results %}{% if result.overview %}{% set overview = result.overview %}
+<h2 id="{{ overview.name }}">{{ overview.title }}</h2>
+<p class="note">As a table: <a href="{{ overview.file }}">{{ overview.file }}</a></p>
+<table class="overview"><tr>{% for column in overview.columns %}<th>{{ column }}</th>{% endfor %}</tr>
+{% for row in overview.rows %}<tr>{% for value in row.cells %}<td>{% if loop.first %}<a href="#{{ row.section }}">
+{{ value }}</a>{% else %}{{ value }}{% endif %}</td>{% endfor %}</tr>
+{% endfor %}</table>{% endif %}
 <h2 id="{{ result.name }}">{{ result.title }}</h2>
 <p class="note">{{ result.source }}</p>
 {% for note in result.warnings %}<p class="standin">{{ note }}</p>{% endfor %}
@@ -48,7 +56,8 @@ def write_page(path: Path, title: str, introduction: str, results: Sequence[dict
         HTML file to write.
     results : sequence of dict
         Each with name, group and what the group is about, title, source, warnings, columns, rows (cells and marks),
-        error_column, figures (paths relative to the page) and notes.
+        error_column, figures (paths relative to the page) and notes; and perhaps ``overview``, a table to stand before
+        it: name, title, file, columns, rows (the section that a row is from, and cells).
     """
     from jinja2 import Environment
 

@@ -7,6 +7,7 @@ import pytest
 
 from experiments.registry import describe, experiment_names, is_slow, select
 from experiments.result import Cell, Result
+from experiments.stability.boundary import Boundary, atlas_result
 from experiments.write import cell_texts, write_index, write_result
 from models.errors import TilestampError
 
@@ -82,3 +83,24 @@ def test_an_unknown_experiment_is_refused():
 @pytest.mark.parametrize("name", experiment_names())
 def test_every_experiment_says_what_it_is(name):
     assert describe(name).endswith(".")
+
+
+def broken(name, method, holds, breaks):
+    boundary = Boundary(method, "layers", "", holds, breaks, "it shows")
+    return atlas_result(f"stability/{name}", name, [boundary])
+
+
+def test_all_boundaries_of_a_folder_are_one_table(tmp_path):
+    results = [broken("races", "per-primitive", 1, 2), result(cell(ours=1.0)), broken("layers", "tiled", 64, None)]
+    page = write_index(results, tmp_path).read_text()
+    table = pd.read_csv(tmp_path / "stability.csv")
+    assert table.experiment.tolist() == ["stability/races", "stability/layers"]
+    assert table.holds.tolist() == [1, 64]
+    assert page.count('<table class="overview">') == 1
+    assert page.index("2 boundaries at one glance") < page.index('href="#stability-layers"')
+    assert "none tried" in page
+
+
+def test_results_without_boundaries_leave_no_such_table(tmp_path):
+    assert "overview" not in write_index([result(cell(ours=1.0))], tmp_path).read_text().split("</style>")[1]
+    assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
