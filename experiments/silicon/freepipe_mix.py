@@ -65,7 +65,7 @@ _BEGINS = {"WARPS": 1 / WARPS, "SETUP_STEPS": 1 / WARPS, "BOX_STEPS": 1 / WARPS}
 LANES = {
     "WARPS": "LANES_IN",
     "SETUP_STEPS": "SETUP_LANES",
-    "BOX_STEPS": "SETUP_LANES",
+    "BOX_STEPS": "BOX_LANES",
     "ROW_STEPS": "ROW_LANES",
     "WARP_STEPS": "SAMPLE_TESTS",
     "READS": "SAMPLE_HITS",
@@ -73,8 +73,8 @@ LANES = {
     "CLIP_WARPS": "CLIP_LANES",
 }
 FITTED: dict[str, dict[str, tuple[float, float]]] = {
-    "freepipe": {"ROW_STEPS": (3.7, 1.0)},
-    "freepipe_early": {"ROW_STEPS": (10.3, 1.0)},
+    "freepipe": {"ROW_STEPS": (8.2, 1.0)},
+    "freepipe_early": {"ROW_STEPS": (10.2, 1.0)},
 }
 DERIVED = {  # lanes that skip a body wait at its end in an instruction of their own; the second scan has shorter bodies
     "freepipe": {"ATOMIC": 1.0, "CLIP_HITS": -5.0},

@@ -26,7 +26,7 @@ _CLASSES = {  # machine event: opcodes, told from ncu's counters by execution pi
     "shared_atomic": "ATOMS",
     "load": "LDG LDL",
     "store": "STG STL",
-    "atomic": "ATOMG RED",
+    "atomic": "ATOMG RED REDG",
     "barrier": "BAR",
 }
 CLASS_OF = {opcode: name for name, opcodes in _CLASSES.items() for opcode in opcodes.split()}

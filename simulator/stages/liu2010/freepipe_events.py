@@ -31,3 +31,4 @@ class FreePipeEvent(IntEnum):
     REST_STEPS = 22  # steps of WARP_STEPS before the unrolled loop
     BOX_STEPS = 23  # set-ups in which a lane has a pixel to test
     CLIP_HITS = 24  # steps of clipped triangles in which a lane hits
+    BOX_LANES = 25  # lanes of BOX_STEPS with a pixel: the others have left

@@ -75,8 +75,8 @@ def _count_vertices(triangles, t0, lanes, simt, address, row):
 
 @njit(cache=True, nogil=True)
 def _start_rows(pieces, lanes):
-    """Set each lane up at its box's first pixel; returns lanes that have a piece and the most rows of any."""
-    active, most = 0, 0
+    """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
+    active, boxes, most = 0, 0, 0
     for lane in range(WARP):
         p = lanes.piece[lane]
         if p >= 0:
@@ -84,8 +84,10 @@ def _start_rows(pieces, lanes):
             box = pieces.box[p]
             _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
             lanes.row_depth[lane] = pieces.depth[p, 0]
-            most = max(most, int(box[3] - box[2] + 1) if box[1] >= box[0] else 0)
-    return active, most
+            if box[1] >= box[0] and box[3] >= box[2]:
+                boxes += 1
+                most = max(most, int(box[3] - box[2] + 1))
+    return active, boxes, most
 
 
 @njit(cache=True, nogil=True)
@@ -206,10 +208,11 @@ def _count_atomics(lanes, hits, shape, merge, row, chunks):
 @njit(cache=True, nogil=True)
 def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
     """Scan the lanes' pieces in lockstep; returns the steps, the rows, and the steps that hit."""
-    active, rows = _start_rows(pieces, lanes)
+    active, boxes, rows = _start_rows(pieces, lanes)
     steps, hit_steps = 0, 0
     row[FreePipeEvent.SETUP_STEPS] += 1
     row[FreePipeEvent.BOX_STEPS] += rows > 0
+    row[FreePipeEvent.BOX_LANES] += boxes
     row[FreePipeEvent.SETUP_LANES] += active
     for r in range(rows):
         active, rest, turns = _start_row(pieces, lanes, r, shape.width, shape.unroll)
