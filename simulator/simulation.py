@@ -53,7 +53,8 @@ def simulate(
     error : float
         Relative error that will do, 0 to 1. Above 0 the expensive stages execute a random part of their units, no
         picture is drawn, and each number carries its 95 % interval (``Run.intervals``); the part grows until the
-        half-width of each stage's time, instructions and sample tests and hits is under ``error`` of their value.
+        half-width of each stage's instructions and sample tests and hits, and of the frame's time, is under ``error``
+        of their value. Frames too small to pay for a sample run in full, and so do stages whose tail decides.
     seed : int
         Of the random part.
     picture : bool
