@@ -1,6 +1,8 @@
 """The command ``tilestamp``: parses arguments, turns errors into one sentence and an exit code."""
 
+import signal
 import sys
+from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -8,12 +10,22 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+TERMINATED = 143
 HELP = "Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time."
+
+
+class _TerminatedError(BaseException):
+    """The order to end, SIGTERM: like Ctrl-C it unwinds, so that nothing half-written and no process is left."""
 
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    signal.signal(signal.SIGTERM, _terminate)
     sys.exit(run_command(sys.argv[1:]))
+
+
+def _terminate(_signal: int, _frame: FrameType | None) -> None:
+    raise _TerminatedError
 
 
 def run_command(arguments: list[str]) -> int:
@@ -22,13 +34,16 @@ def run_command(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0; 2 for bad input; 130 after Ctrl-C.
+        0; 2 for bad input; 130 after Ctrl-C; 143 after SIGTERM.
     """
     try:  # the imports too: they take a second in which a user may change his mind
         return _run(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("tilestamp: interrupted; nothing was half-written\n")
         return INTERRUPTED
+    except _TerminatedError:
+        sys.stderr.write("tilestamp: told to end; nothing was half-written\n")
+        return TERMINATED
     except BrokenPipeError:
         sys.stderr.close()
         return 0

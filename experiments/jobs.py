@@ -7,7 +7,6 @@ import multiprocessing
 import os
 import shutil
 import signal
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 Say = Callable[[str], None]
 POLL_SECONDS = 0.2
-END_SECONDS = 5.0  # that an interrupted process has to leave by itself
+END_SECONDS = 5.0  # that a process has to end once it is told to
 _progress: "SimpleQueue[str] | None" = None  # of a worker process: to whom it says what it does
 
 
@@ -71,10 +70,11 @@ def run_experiments(names: Sequence[str], output: Path, options: dict[str, Any],
         futures = [pool.submit(_run_folder, group, output, options) for group in folders]
         _watch(futures, progress, say)
         return [result for future in futures for result in future.result()]
-    except BrokenProcessPool as error:
-        raise TilestampError("a process that ran experiments ended before its time: out of memory? try -j 1") from error
-    except BaseException:
+    except BaseException as error:
         _end_workers(output)
+        if isinstance(error, BrokenProcessPool):
+            sentence = "a process that ran experiments ended before its time: out of memory? try -j 1"
+            raise TilestampError(sentence) from error
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -99,11 +99,10 @@ def _drawn(_path: Path) -> None:
 
 
 def _start(progress: "SimpleQueue[str]") -> None:
-    """Set a worker up: Ctrl-C is the parent's business, and its order to end cleans up on the way out."""
+    """Set a worker up: Ctrl-C is the parent's business, which ends its workers and removes what they leave."""
     global _progress  # noqa: PLW0603 - a process has one
     _progress = progress
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 
