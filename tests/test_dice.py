@@ -10,7 +10,8 @@ from models.errors import TilestampError
 from models.simt import Coalescing, Simt
 from simulator.scenes import LookAt, load_scene
 from simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
-from simulator.stages.eisenacher2010.dice import DiceEvent, dice
+from simulator.stages.eisenacher2010.dice import dice
+from simulator.stages.eisenacher2010.dice_counts import DiceEvent
 from tests import naive_patches
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)

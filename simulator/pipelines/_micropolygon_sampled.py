@@ -23,7 +23,8 @@ from simulator.stages.eisenacher2010.bucket_count import (
 )
 from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from simulator.stages.eisenacher2010.bucket_write import bucket_write, write_streams
-from simulator.stages.eisenacher2010.dice import dice, dice_work
+from simulator.stages.eisenacher2010.dice import dice
+from simulator.stages.eisenacher2010.dice_counts import dice_work
 from simulator.stages.eisenacher2010.sampled_tiles import TileSizes, meeting, tile_sizes
 from simulator.stages.eisenacher2010.tile_range import Tiles
 from simulator.stages.eisenacher2010.tile_raster import raster_streams, tile_raster

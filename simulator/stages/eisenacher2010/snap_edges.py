@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from models.simt import Simt
 from simulator.stages.eisenacher2010.bound_and_split import SubPatches
-from simulator.stages.eisenacher2010.dice import Grids, dice_work
+from simulator.stages.eisenacher2010.dice import Grids
+from simulator.stages.eisenacher2010.dice_counts import dice_work
 from simulator.work import Work
 
 _I64 = NDArray[np.int64]
