@@ -6,11 +6,15 @@ the share in which all footprints of the launch together (or the span that a str
 stay in the cache until something pushes them out (write-back), and the launch that does so pays. What is in the cache
 is kept by buffer, least recently used first: a frame's launches hand whole buffers to each other, so buffers and not
 lines are what is reused.
+
+Where L1 keeps what its SM loaded (compute capability 7.0 on), units that ask for the same segment find it there only
+if the other ran on the same SM. With S of them and units dealt at random, a segment that k units ask for comes from L2
+``S (1 - (1 - 1/S)^k)`` times: hardly less than k for few, at most S for many.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from models.events import MachineEvent
@@ -21,6 +25,8 @@ if TYPE_CHECKING:
 
     from models.fixed_function import PipeLaunch
     from models.machine import Machine
+
+L1_HOLDS_LOADS = 7.0  # compute capability from which L1 keeps global loads by default; before, a cache of 48 KB or none
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,23 @@ def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[T
     machine : Machine
     """
     cache = _Cache(machine.memory.l2_bytes)
-    return [_launch_traffic(_streams(launch), cache) for launch in launches]
+    return [_launch_traffic(_past_l1(_streams(launch), machine), cache) for launch in launches]
+
+
+def _past_l1(streams: tuple[Stream, ...], machine: Machine) -> tuple[Stream, ...]:
+    """Streams with the bytes that come from L2, where each SM's L1 holds what that SM asked for before."""
+    if float(machine.compute_capability) < L1_HOLDS_LOADS:
+        return streams
+    sms = machine.sm.count
+    return tuple(replace(stream, bytes=_from_l2(stream, sms)) if stream.asked_bytes else stream for stream in streams)
+
+
+def _from_l2(stream: Stream, sms: int) -> int:
+    """Bytes of a stream that no L1 serves."""
+    footprint = min(stream.footprint_bytes, stream.asked_bytes)
+    again = stream.asked_bytes / footprint
+    fetched: float = sms * (1.0 - (1.0 - 1.0 / sms) ** again)
+    return round(footprint * fetched)
 
 
 def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:

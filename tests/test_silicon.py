@@ -10,6 +10,10 @@ from experiments.silicon.leave_one_out import _refit
 from experiments.silicon.mix_from_sass import RASTER, main
 from experiments.silicon.raster_sections import raster_sections
 from experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
+from models.events import EVENTS
+from models.launch import Launch, Stream
+from models.machine import load_machine
+from models.traffic import traffic
 from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
@@ -112,3 +116,19 @@ def test_each_thread_of_a_block_stores_its_copy_of_the_parameters():
     copied = with_parameter_copy(Work("bin_raster", "binRaster", BinRasterEvent, table, 2, 512))
     assert copied.table[:, BinRasterEvent.STORE_BYTES].tolist() == [664 * 512, 664 * 512, 0]
     assert copied.streams[-1].bytes == 2 * 664 * 512
+
+
+def _from_l2(machine, asked, footprint=32000):
+    stream = Stream("vertices", "load", footprint, footprint, asked_bytes=asked)
+    launch = Launch("s", "k", 1, 64, 16, 0, np.zeros((1, EVENTS)), streams=(stream,))
+    return traffic([launch], load_machine(machine))[0].l2_bytes
+
+
+def test_what_many_units_ask_for_comes_from_l2_once_an_sm_at_most():
+    assert _from_l2("h200", 32000) == 32000
+    assert _from_l2("h200", 2 * 32000) == pytest.approx(2 * 32000, rel=0.01)
+    assert _from_l2("h200", 10**9) == 132 * 32000
+
+
+def test_units_share_what_they_ask_for_where_l1_keeps_no_loads():
+    assert _from_l2("gtx680", 10**9) == 32000

@@ -299,7 +299,7 @@ def fine_streams(
     """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
 
     Tiles that share a triangle are drawn at about the same time: of headers and records what is read again is found in
-    a cache, and each passes once.
+    a cache, and each passes once, or once an SM that asks for it where L1 is what keeps it.
     """
     E = FineRasterEvent
     total = table.sum(axis=0)
@@ -312,8 +312,8 @@ def fine_streams(
     records = kept * setup.planes.shape[1] * 4
     return (
         Stream("tile_queues", "load", lists, 4 * entries),
-        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES),
-        Stream("triangle_data", "load", min(rest, records), records),
+        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, asked_bytes=headers),
+        Stream("triangle_data", "load", min(rest, records), records, asked_bytes=rest),
         Stream("pixels", "load", tiles, pixels if tiles else 0),
         Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
     )

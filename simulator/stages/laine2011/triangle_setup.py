@@ -38,6 +38,7 @@ from simulator.stages.laine2011.triangle_setup_paths import (
 )
 from simulator.work import Work
 
+POSITIONS_A_SECTOR = 2  # vertices of 16 bytes in the 32 that a cache fetches
 Release = Literal["1.1", "nvdiffrast"]
 
 BLOCK = 64  # threads, a triangle each
@@ -243,7 +244,7 @@ def triangle_setup(
             out = _grown(out, needed)
             out.first[several] = F + np.cumsum(counts) - counts
             _setup_several(several, positions, triangles, view, out)
-    streams = _streams(positions, out, view)
+    streams = _streams(positions, triangles, out, view)
     work = Work(
         "triangle_setup",
         "triangleSetup",
@@ -257,11 +258,22 @@ def triangle_setup(
     return out, work, {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
 
 
-def _streams(positions: NDArray[np.float32], out: Setup, view: View) -> tuple[Stream, ...]:
+def _asked(triangles: NDArray[np.int32]) -> int:
+    """Bytes of vertices that the blocks ask for, in sectors, each once a block."""
+    size = 3 * BLOCK
+    padded = np.pad(triangles.ravel(), (0, -triangles.size % size), mode="edge" if triangles.size else "constant")
+    sectors = np.sort((padded // POSITIONS_A_SECTOR).reshape(-1, size), axis=1)
+    return POSITIONS_A_SECTOR * POSITION_BYTES * int(len(sectors) + np.count_nonzero(np.diff(sectors, axis=1)))
+
+
+def _streams(
+    positions: NDArray[np.float32], triangles: NDArray[np.int32], out: Setup, view: View
+) -> tuple[Stream, ...]:
     """Buffers that setup reads and writes, as L2 sees them.
 
     Lanes of a block read what they share (words of a line, vertices of neighbours) through L1 and the texture cache,
-    and writes to one line meet in L2, so that each buffer passes once. Records are written in sectors of 32 bytes.
+    and writes to one line meet in L2, so that each buffer passes once; vertices again for each block that asks, where
+    no texture cache holds them. Records are written in sectors of 32 bytes.
     """
     indices, vertices = len(out.first) * INDEX_BYTES, len(positions) * POSITION_BYTES
     kept = int(out.subtriangles.sum(dtype=np.int64))
@@ -270,7 +282,7 @@ def _streams(positions: NDArray[np.float32], out: Setup, view: View) -> tuple[St
         data //= 2
     return (
         Stream("indices", "load", indices, indices),
-        Stream("positions", "load", vertices, vertices),
+        Stream("positions", "load", vertices, vertices, asked_bytes=_asked(triangles)),
         Stream("subtriangles", "store", len(out.first), len(out.first)),
         Stream("headers", "store", headers, headers),
         Stream("triangle_data", "store", data, data),
