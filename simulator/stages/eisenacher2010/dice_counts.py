@@ -1,4 +1,4 @@
-"""What the machine does while it dices (Eisenacher & Loop 2010, section 3): a thread a vertex, a half-warp a sub-patch."""
+"""What the machine does while it dices: a thread a vertex, a half-warp a sub-patch (Eisenacher & Loop 2010, 3)."""
 
 from enum import IntEnum
 
