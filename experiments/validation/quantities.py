@@ -102,6 +102,16 @@ MOVED = (
         lambda launch, moved: moved.dram_bytes + CODE_BYTES.get(launch.kernel, 0),
     ),
 )
+CROSSED = 1.5  # lts counters: sectors that cross to the other half of the chip count twice (stores: 1.47 to 1.53)
+MOVED_LOCAL = (
+    Moved(
+        "L2 traffic",
+        tuple((f"lts__t_sectors_op_{name}.sum", 32.0 / CROSSED) for name in ("read", "write", "atom", "red")),
+        lambda _, moved: moved.l2_bytes,
+    ),
+    MOVED[1],
+)
+"""The same of a kernel that uses local memory, which the counters of global loads and stores at L1 do not see."""
 MOVED_AIM = 0.20
 TIME = "time"
 WALL = "wall time"  # seconds that one prediction takes us: pictures, counts and price
