@@ -122,6 +122,7 @@ def test_the_machine_executes_the_stages_of_attempts_that_fail(monkeypatch):
 
 def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
+    monkeypatch.setattr("simulator.sampler.SMALLEST", 1)
     run = simulate(soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5)
     assert run.sampled
     assert [work.stage for work in run.frame.works] == [*STAGES[:2], *STAGES]
