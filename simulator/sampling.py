@@ -212,7 +212,7 @@ def _fit(sample: Sample, values: Floats) -> _Fit:
     strata, taken = sample.strata, sample.taken
     known = strata.ordered[_places(strata, taken)]
     factors, leverage = _factors(sample, known, values)
-    residual = values - known @ factors
+    residual = values - _product(known, factors)
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
     some = np.maximum(taken, 1)[:, None]
     mean = _reduce(residual, starts, taken) / some
@@ -232,10 +232,16 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Flo
     weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
     some = known[first:, :used]
     weighted = (some * weight[:, None]).T
-    inverse = np.linalg.pinv(weighted @ some, hermitian=True)
-    factors[: some.shape[1]] = inverse @ (weighted @ values[first:])
-    leverage[first:] = np.minimum(((some @ inverse) * weighted.T).sum(axis=1), MOST_PULL)
+    inverse: Floats = np.linalg.pinv(_product(weighted, some), hermitian=True)
+    factors[: some.shape[1]] = _product(inverse, _product(weighted, values[first:]))
+    leverage[first:] = np.minimum((_product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
     return factors, leverage
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """Multiply matrices on this thread: those of a linear algebra library spin long after such small products."""
+    made: Floats = np.einsum("ij,jk->ik", a, b)
+    return made
 
 
 def _reduce(values: Floats, starts: Integers, taken: Integers) -> Floats:
@@ -340,7 +346,7 @@ def expanded(sample: Sample) -> Integers:
     fit = _fit(sample, values)
     ran = np.zeros(len(strata.order), np.bool_)
     ran[_places(strata, taken)] = True
-    rows = strata.ordered[~ran] @ fit.factors + np.repeat(fit.mean, strata.units - taken, axis=0)
+    rows = _product(strata.ordered[~ran], fit.factors) + np.repeat(fit.mean, strata.units - taken, axis=0)
     np.maximum(rows, 0.0, out=rows)
     sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
     rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
