@@ -1,4 +1,4 @@
-"""H200, unseen: scenes that were measured after every number of the mixes was chosen, model beside machine.
+"""H200, unseen: scenes that no number of the mixes was fitted to, model beside machine.
 
 Thirteen scenes at three sizes through CudaRaster and FreePipe, five through the micropolygon back end
 (``measured/README.md``). None of them gave a mix or the machine a number, so all cells are predictions.
