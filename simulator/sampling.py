@@ -12,7 +12,7 @@ Everything here is a pure function of sizes, rows and a seed.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,13 +232,13 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Flo
     weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
     some = known[first:, :used]
     weighted = (some * weight[:, None]).T
-    inverse: Floats = np.linalg.pinv(_product(weighted, some), hermitian=True)
+    inverse = np.linalg.pinv(_product(weighted, some), hermitian=True)
     factors[: some.shape[1]] = _product(inverse, _product(weighted, values[first:]))
     leverage[first:] = np.minimum((_product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
     return factors, leverage
 
 
-def _product(a: Floats, b: Floats) -> Floats:
+def _product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
     """Multiply matrices on this thread: those of a linear algebra library spin long after such small products."""
     made: Floats = np.einsum("ij,jk->ik", a, b)
     return made
