@@ -21,6 +21,14 @@ from simulator.work import Work
 
 CAMERAS = "micropolygon_cameras.json"
 SHUFFLED = "_shuffle"
+PADDED = {  # words from one counter to the next, and whether a warp adds once for all its lanes at one
+    "k_addr_pad1": (1, False),
+    "k_addr_pad8": (8, False),
+    "k_addr_pad32": (32, False),
+    "k_addr_pad64": (64, False),
+    "k_addr_pad1_warpagg": (1, True),
+    "k_addr_pad64_warpagg": (64, True),
+}
 NO_BOX_TILE = 8  # the only tile size that was measured without box tests
 
 
@@ -65,8 +73,8 @@ def grids_of(camera: dict[str, Any], simt: Simt, *, shuffle: bool) -> Grids:
     return grids._replace(vertices=grids.vertices[order], boxes=grids.boxes[order])
 
 
-def back_end(grids: Grids, camera: dict[str, Any], simt: Simt) -> Iterator[Case]:
-    """Run the measured kernels at each tile size."""
+def back_end(grids: Grids, camera: dict[str, Any], simt: Simt, *, padded: bool = False) -> Iterator[Case]:
+    """Run the measured kernels at each tile size; with padded and aggregated counters only where asked for."""
     width, height = camera["width"], camera["height"]
     for tile in TILE_SIZES:
         tiles = screen_tiles(width, height, tile, camera["bound_pixels"])
@@ -74,6 +82,9 @@ def back_end(grids: Grids, camera: dict[str, Any], simt: Simt) -> Iterator[Case]
         start, _ = bucket_scan(count, simt, counting=False)
         lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt)
         yield Case(tile, 0, "k_addr", added[1])
+        for name, (padding, aggregate) in PADDED.items() if padded and tile >= camera["bound_pixels"] else ():
+            _, _, spread = bucket_count(grids.boxes, tiles, simt, padding=padding, aggregate=aggregate)
+            yield Case(tile, 0, name, spread[1])
         yield Case(tile, 0, "k_write", written[0])
         for spp in (1, 4):
             for box in (True, False) if tile == NO_BOX_TILE else (True,):

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.validation.back_end import SHUFFLED, back_end, cameras, grids_of
+from experiments.validation.back_end import PADDED, SHUFFLED, back_end, cameras, grids_of
 from experiments.validation.quantities import (
     MOVED,
     MOVED_AIM,
@@ -126,13 +126,14 @@ def _tall(table: "pd.DataFrame") -> "pd.DataFrame":
 def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     """Launches of every scene that has a camera, in its own order and shuffled."""
     mix = load_mix("micropolygon", machine.compute_capability)
-    measured = {key[0] for key in read(folder / MICROPOLYGON)}
+    keys = read(folder / MICROPOLYGON)
+    measured, padded = {key[0] for key in keys}, {key[0] for key in keys if key[4] in PADDED}
     for name, camera in cameras(folder).items():
         for scene in (name, name + SHUFFLED):
             if scene in measured:
                 say(scene)
                 grids = grids_of(camera, machine.simt, shuffle=scene != name)
-                for case in back_end(grids, camera, machine.simt):
+                for case in back_end(grids, camera, machine.simt, padded=scene in padded):
                     key = (scene, camera["width"], case.tile, case.spp, case.kernel)
                     yield key, mix.launch(case.work, machine.sm.warp_size)
 
