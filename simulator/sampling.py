@@ -240,7 +240,11 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Flo
 
 def _product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
     """Multiply matrices on this thread: those of a linear algebra library spin long after such small products."""
-    made: Floats = np.einsum("ij,jk->ik", a, b)
+    if a.shape[0] < a.shape[1]:  # few rows
+        return np.stack([(row[:, None] * b).sum(axis=0) for row in a])
+    made: Floats = a[:, :1] * b[0]
+    for column in range(1, a.shape[1]):
+        made += a[:, column, None] * b[column]
     return made
 
 
