@@ -7,6 +7,7 @@ import pytest
 
 from models.errors import TilestampError
 from models.events import MachineEvent
+from simulator import simulate
 from simulator.mix import MIXES, PROVENANCES, KernelMix, load_mix
 from simulator.work import Work
 
@@ -76,3 +77,10 @@ def test_every_mix_says_where_each_number_comes_from(path):
         for kind, source in kernel_mix.provenance.values():
             assert kind in PROVENANCES
             assert source
+
+
+def test_more_samples_never_take_less_time_on_the_h200():
+    """Sixteen samples have no machine code of their own; their price once fell to that of one."""
+    runs = [simulate("teapot", machine="h200", width=160, height=120, spp=spp) for spp in (1, 4, 16)]
+    times = [run.stages.loc["tile_raster", "milliseconds"] for run in runs]
+    assert times == sorted(times)
