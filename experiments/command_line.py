@@ -1,5 +1,6 @@
 """The command ``tilestamp``: parses arguments, turns errors into one sentence and an exit code."""
 
+import os
 import signal
 import sys
 from types import FrameType
@@ -20,6 +21,7 @@ class _TerminatedError(BaseException):
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small products: threads would spin longer than they compute
     signal.signal(signal.SIGTERM, _terminate)
     sys.exit(run_command(sys.argv[1:]))
 

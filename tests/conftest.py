@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 SHARED_VARIABLE = "TILESTAMP_SHARED"  # names the folder where it lies elsewhere
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # the scene search path that users set
 
