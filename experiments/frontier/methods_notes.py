@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pandas as pd
 
+ONE_STAGE = ("stamps", "across-polygons", "bit-mask")
 TIES = {"flip": 1e-3, "wrong": 1e-5}  # differences that count for nothing: no eye sees so little (assumed)
 
 
@@ -16,7 +17,7 @@ def notes(table: "pd.DataFrame", doubles: "pd.DataFrame") -> list[str]:
         missing = sorted(set(table.pipeline) - set(rows.pipeline))
         if missing:
             lines.append(f"Without a time on {machine}, for want of an instruction mix: {', '.join(missing)}.")
-    return [*lines, *_pixels(table), *_depths(table), *_doubles(doubles)]
+    return [*lines, *_one_stage(table), *_pixels(table), *_depths(table), *_doubles(doubles)]
 
 
 def _range(table: "pd.DataFrame") -> str:
@@ -27,6 +28,17 @@ def _range(table: "pd.DataFrame") -> str:
         f"On a front FLIP counts in steps of {TIES['flip']:g}. Pictures are small, so launches and latencies weigh "
         "more than in a game's frame; the rates of fixed function on the H200 are assumed."
     )
+
+
+def _one_stage(table: "pd.DataFrame") -> list[str]:
+    """Studies of one stage say nothing of the time before it."""
+    studies = [name for name in ONE_STAGE if name in set(table.pipeline)]
+    if not studies:
+        return []
+    return [
+        f"The times of {', '.join(studies)} are those of their tests alone: polygons come diced and projected, where the "
+        "other pipelines' times begin at vertices, triangles or patches."
+    ]
 
 
 def _on_front(machine: str, rows: "pd.DataFrame") -> str:
