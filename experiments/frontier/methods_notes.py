@@ -35,10 +35,11 @@ def _one_stage(table: "pd.DataFrame") -> list[str]:
     studies = [name for name in ONE_STAGE if name in set(table.pipeline)]
     if not studies:
         return []
-    return [
-        f"The times of {', '.join(studies)} are those of their tests alone: polygons come diced and projected, where the "
-        "other pipelines' times begin at vertices, triangles or patches."
-    ]
+    sentence = (
+        f"The times of {', '.join(studies)} are those of their tests alone: polygons come diced and projected, where "
+        "the other pipelines' times begin at vertices, triangles or patches."
+    )
+    return [sentence]
 
 
 def _on_front(machine: str, rows: "pd.DataFrame") -> str:
