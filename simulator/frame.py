@@ -13,7 +13,7 @@ REMARKS = {  # a fact that counts what was lost, repeated or left to chance: the
     "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn",
     "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
     "wrong_pixels": "{:,} pixels show another micropolygon than without the mask",
-    "retries": "{:,} attempts to draw failed for want of room in a queue, and were repeated; the time includes them",
+    "retries": "{:,} attempts of a first frame fail for want of room in a queue (-O first_frame=True prices them)",
     "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows hangs on the packing",
     "mixed_pixels": "{:,} pixels mix the halves of two triangles' colours",
     "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",

@@ -101,7 +101,7 @@ def test_samples_smooth_edges():
 def test_a_buffer_that_is_too_small_grows_and_the_frame_is_drawn_again(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
     monkeypatch.setattr(module.tiles, "initial_capacity", lambda *_: 1)
-    small = draw(soup(), (300, 300))
+    small = draw(soup(), (300, 300), first_frame=True)
     monkeypatch.undo()
     assert small.facts["retries"] == 2
     plain = draw(soup(), (300, 300))
@@ -110,10 +110,13 @@ def test_a_buffer_that_is_too_small_grows_and_the_frame_is_drawn_again(monkeypat
     assert small.facts["counters"] == plain.facts["counters"]
 
 
-def test_the_machine_executes_the_stages_of_attempts_that_fail(monkeypatch):
+def test_a_first_frame_executes_the_stages_of_attempts_that_fail(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
     monkeypatch.setattr(module.tiles, "initial_capacity", lambda *_: 1)
-    works = draw(soup(), (300, 300)).works
+    later = draw(soup(), (300, 300))
+    assert [work.stage for work in later.works] == [*STAGES]
+    assert later.facts["retries"] == 2
+    works = draw(soup(), (300, 300), first_frame=True).works
     assert [work.stage for work in works] == [*STAGES[:2], *STAGES[:3], *STAGES]
     for stage in STAGES:
         tables = [work.table for work in works if work.stage == stage]
@@ -123,7 +126,9 @@ def test_the_machine_executes_the_stages_of_attempts_that_fail(monkeypatch):
 def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
     monkeypatch.setattr("simulator.sampler.SMALLEST", 1)
-    run = simulate(soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5)
+    run = simulate(
+        soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5, first_frame=True
+    )
     assert run.sampled
     assert [work.stage for work in run.frame.works] == [*STAGES[:2], *STAGES]
     assert run.frame.facts["retries"] == 1

@@ -141,7 +141,9 @@ def frame(count: int) -> Run:
     """Draw ``count`` triangles that cover the screen, with what retries it takes."""
     triangles = np.tile(np.arange(3, dtype=np.int32), (count, 1))
     scene = Scene("screen", mesh=Mesh(_screen(), triangles, clip_space=True))
-    return simulate(scene, "cudaraster", MACHINE, width=SIZE, height=SIZE, camera=np.eye(4), picture=False)
+    return simulate(
+        scene, "cudaraster", MACHINE, width=SIZE, height=SIZE, camera=np.eye(4), picture=False, first_frame=True
+    )
 
 
 def _plot(table: "pd.DataFrame", path: "Path") -> None:

@@ -29,10 +29,13 @@ def sampled_draw(
     height: int,
     simt: Simt,
     options: dict[str, Any],
+    *,
+    first_frame: bool,
 ) -> Frame:
     """One draw: all triangles set up, binned and listed; counted in part of the blocks, and drawn in part of the tiles.
 
-    Where a queue is too small for the first attempt, the stages up to it stand among the works once more.
+    Where a queue is too small for the first attempt of a first frame, the stages up to it stand among the works once
+    more.
 
     Parameters
     ----------
@@ -45,6 +48,7 @@ def sampled_draw(
     simt : Simt
     options : dict
         ``release``, ``samples``, ``mode``, ``cull_backfaces`` and ``guard_band``.
+    first_frame : bool
     """
     release, samples, mode = options["release"], options["samples"], options["mode"]
     depth, _, _, interpolate = MODES[mode]
@@ -77,7 +81,7 @@ def sampled_draw(
     needed = facts["numSubtris"], bin_facts["num_bin_segments"], tile_facts["num_tile_segments"]
     room = first_room(len(triangles), width, height).values()
     failed = [works[:last] for last, (most, first) in enumerate(zip(needed, room, strict=True), 1) if most > first]
-    return Frame.numbers([*chain(*failed), *works], {"retries": len(failed)})
+    return Frame.numbers([*chain(*failed), *works] if first_frame else works, {"retries": len(failed)})
 
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:

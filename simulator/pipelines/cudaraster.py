@@ -30,7 +30,7 @@ from simulator.stages.laine2011 import coarse_raster as tiles
 from simulator.stages.laine2011.coverage import TILE
 from simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
-from simulator.stages.laine2011.triangle_setup import SLACK, Release, triangle_setup
+from simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
 from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 from simulator.work import Work
 
@@ -46,6 +46,7 @@ class _State:
     simt: Simt
     counting: bool
     colors: NDArray[np.float32] | None
+    first_frame: bool
     capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
@@ -69,6 +70,7 @@ def cudaraster(
     guard_band: bool | None = None,
     batches: int = 1,
     copy_parameters: bool = False,
+    first_frame: bool = False,
     counting: bool = True,
     sample: Sampler | None = None,
     picture: bool = True,
@@ -100,6 +102,9 @@ def cudaraster(
         Draws that the triangles are divided among; the first clears.
     copy_parameters : bool
         As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory.
+    first_frame : bool
+        Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
+        they have grown in a frame before, as where frames are timed; ``facts["retries"]`` says how often.
     counting : bool
     sample : Sampler, optional
         Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
@@ -125,9 +130,9 @@ def cudaraster(
     options: dict[str, Any] = {"release": release, "samples": msaa, "mode": mode}
     options |= {"cull_backfaces": cull_backfaces, "guard_band": guard_band}
     if sample is not None and batches == 1 and sample.pays(len(mesh.triangles)):
-        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options)
+        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options, first_frame=first_frame)
     colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
-    state = _State(options, (width, height), simt, counting, colors)
+    state = _State(options, (width, height), simt, counting, colors, first_frame)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
         _draw(state, positions, mesh.triangles[first:last], first)
     if copy_parameters:
@@ -152,10 +157,9 @@ def cudaraster(
 
 
 def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.int32], first: int) -> None:
-    """One draw: the four stages, again from the start with larger buffers where one was too small.
+    """One draw: the four stages; in a first frame, again from the start with larger buffers where one was too small.
 
-    A stage that overflows is executed to its end all the same, which the frame's works say; the kernels behind it
-    return at once.
+    A stage that overflows is executed to its end all the same; the kernels behind it return at once.
     """
     width, height = state.size
     release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
@@ -167,7 +171,7 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         setup, setup_work, facts = triangle_setup(
             positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
             guard_band=state.options["guard_band"], depth=depth, interpolate=interpolate,
-            capacity=state.capacity["numSubtris"],
+            capacity=state.capacity["numSubtris"] if state.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
         setup_work = replace(setup_work, variant=mode)
         state.works.append(setup_work)
@@ -203,13 +207,13 @@ def _initial_capacity(state: _State, triangles: int) -> None:
 
 
 def _grow(state: _State, name: str, needed: int, slack: int) -> bool:
-    """Note what a draw needed; True, with more room, where it did not fit."""
+    """Note what a draw needed, and make more room where it did not fit; True where it has to be repeated now."""
     state.needed[name] = max(state.needed[name], needed)
     if needed <= state.capacity[name]:
         return False
     state.capacity[name] = needed + slack
     state.retries += 1
-    return True
+    return state.first_frame
 
 
 def _batch_bounds(triangles: int, batches: int) -> list[tuple[int, int]]:
