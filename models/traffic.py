@@ -81,6 +81,8 @@ def _past_l1(streams: tuple[Stream, ...], machine: Machine) -> tuple[Stream, ...
 def _from_l2(stream: Stream, sms: int) -> int:
     """Bytes of a stream that no L1 serves."""
     footprint = min(stream.footprint_bytes, stream.asked_bytes)
+    if not footprint:
+        return 0
     again = stream.asked_bytes / footprint
     fetched: float = sms * (1.0 - (1.0 - 1.0 / sms) ** again)
     return round(footprint * fetched)

@@ -225,3 +225,8 @@ def test_counts_have_no_time():
 def test_an_unknown_fidelity_is_refused():
     with pytest.raises(TilestampError, match="no fidelity 'exact'"):
         price([], GTX280, "exact")
+
+
+def test_a_stream_that_touches_nothing_moves_nothing():
+    asked = Stream("records", "load", 64, 0, asked_bytes=64)
+    assert traffic([launch(streams=[asked])], H200)[0].l2_bytes == 0

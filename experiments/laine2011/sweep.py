@@ -19,12 +19,12 @@ WIDTH, HEIGHT = 1024, 768
 STAGES = {"triangle_setup": "setup", "bin_raster": "bin", "coarse_raster": "coarse", "fine_raster": "fine"}
 PUBLISHED_AREAS = tuple(tick / 4 for tick in range(161))
 FITTED_AREAS = (0.0, 0.25, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 40.0)  # simulator/mixes/cudaraster/cc2.toml
-DEFAULT_AREAS = (0.0, 0.25, 0.5, 1.0, 4.0, 8.0, 12.0, 16.0, 27.0, 40.0)
+DEFAULT_AREAS = (0.0, 0.5, 1.0, 4.0, 8.0, 16.0, 40.0)
 VARIABLE = "TILESTAMP_SWEEP"  # "all" for the 161 published areas, or areas: "0.5,3,17"
 
 
 def areas() -> tuple[float, ...]:
-    """Areas to draw, in pixels a triangle: ten, unless the environment variable TILESTAMP_SWEEP names others.
+    """Areas to draw, in pixels a triangle: seven, unless the environment variable TILESTAMP_SWEEP names others.
 
     Raises
     ------
