@@ -51,7 +51,16 @@ def lines(
 
 
 def paired_bars(
-    table: "pd.DataFrame", path: Path, *, label: str, ours: str, published: str, status: str, title: str, y_label: str
+    table: "pd.DataFrame",
+    path: Path,
+    *,
+    label: str,
+    ours: str,
+    published: str,
+    status: str,
+    title: str,
+    y_label: str,
+    known: str = "published",
 ) -> None:
     """Draw a bar for each row, solid where predicted and hatched where fitted, the published value as a diamond.
 
@@ -61,6 +70,8 @@ def paired_bars(
         A row a cell; columns ``label``, ``ours``, ``published``, ``status``.
     path : Path
         PNG to write.
+    known : str
+        What the diamonds are: published, or measured.
     """
     with figure(path, title, figsize=(max(7.2, 0.42 * len(table)), 4.4)) as axes:
         positions = range(len(table))
@@ -69,7 +80,7 @@ def paired_bars(
             if kind == "fitted":
                 bar.set(facecolor="white", edgecolor=PALETTE[0], hatch="////")
         (points,) = axes.plot(positions, table[published], **PUBLISHED)
-        kinds = {"published": points} | dict(zip(table[status], bars, strict=True))
+        kinds = {known: points} | dict(zip(table[status], bars, strict=True))
         axes.set_xticks(list(positions), table[label], rotation=45, ha="right", fontsize=8)
         axes.set(ylabel=y_label)
         axes.legend(kinds.values(), kinds.keys())
