@@ -11,7 +11,8 @@ from models.launch import Launch
 from models.machine import Machine
 from models.timing import Timing
 from models.traffic import Traffic
-from simulator.sampling import Estimate, Totals, totals
+from simulator.estimate import Estimate, Totals
+from simulator.sampling import totals
 from simulator.work import FixedFunctionWork, Work
 
 UNPLAYED = 0.45  # of the time beyond the roofline: measured over seeds (killeroo and teapot on a GTX 280)

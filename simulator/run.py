@@ -14,9 +14,9 @@ from models.machine import Machine, load_machine
 from models.price import Fidelity, price
 from models.timing import Timing
 from simulator import intervals
+from simulator.estimate import Estimate
 from simulator.frame import Frame
 from simulator.mix import load_mix
-from simulator.sampling import Estimate
 from simulator.stage_table import interval_table, stage_table
 from simulator.work import FixedFunctionWork, Work
 

@@ -13,8 +13,10 @@ from models.events import INSTRUCTION_CLASSES
 from models.launch import Stream
 from models.machine import Machine
 from models.traffic import Traffic
+from simulator.estimate import Floats, Integers
 from simulator.mix import load_mix
-from simulator.sampling import Floats, Integers, Sample, drawn, enlarged, expanded, make_strata, pilot, totals
+from simulator.sampling import enlarged, expanded, totals
+from simulator.strata import Sample, drawn, make_strata, pilot
 from simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs

@@ -11,188 +11,22 @@ Everything here is a pure function of sizes, rows and a seed.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-CERTAIN = 24  # largest units, always executed
-STEP = 1.3  # largest ratio of sizes in a stratum
-FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
+from simulator.estimate import Floats, Integers, Totals, t_quantile
+from simulator.strata import Sample, drawn, places
+
 ENOUGH = 16  # units that ran for each thing known, before rows are predicted by them
 FEWEST_KNOWN = 2  # things: 1, and the size
-PILOT = 96  # units that the first sample draws in proportion to size, and ...
-PILOT_EACH = 5  # ... at least from each stratum
 PRIOR = 1.0  # degrees of freedom that the spread usual in other strata counts for
 GENEROUS = 1.15  # of the units that the error seems to ask for: a spread is itself an estimate
 MOST_PULL = 0.9  # of one unit on its own prediction, as the spread takes it
 RARE = 0.15  # of what it does, by which one unit that was not seen may deviate (assumed), where ...
 ALIKE = 0.01  # (relative) nearly all units do what is foretold, which is ...
 MOSTLY = 0.9  # of them
-_QUANTILES = np.array([12.706, 4.303, 3.182, 2.776])  # of t at 97.5 %, for 1 to 4 degrees of freedom
-_Z = 1.959964
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-
-class Estimate(NamedTuple):
-    """A number and its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-    @property
-    def half_width(self) -> float:
-        """Half the interval's width."""
-        return (self.high - self.low) / 2
-
-    @property
-    def relative(self) -> float:
-        """Half-width over value; 0 where both are 0."""
-        return self.half_width / abs(self.value) if self.half_width else 0.0
-
-
-class Totals(NamedTuple):
-    """Estimated totals of several quantities: value, variance and degrees of freedom, (k,) each."""
-
-    value: Floats
-    variance: Floats
-    freedom: Floats
-
-    @property
-    def half_width(self) -> Floats:
-        """Of the 95 % intervals."""
-        return t_quantile(self.freedom) * np.sqrt(self.variance)
-
-
-@dataclass(frozen=True)
-class Strata:
-    """Units by stratum; stratum 0 is the certainty stratum.
-
-    Parameters
-    ----------
-    known : ndarray, (units, p), float64
-        What is known of each unit: 1, its size, and more; each in units of its mean.
-    order : ndarray, (units,), int64
-        Units, stratum after stratum, in random order inside each: a sample is a prefix of each stratum.
-    first : ndarray, (strata + 1,), int64
-        Where each stratum starts in ``order``.
-    """
-
-    known: Floats
-    order: Integers
-    first: Integers
-
-    @property
-    def units(self) -> Integers:
-        """Units of each stratum."""
-        return np.diff(self.first)
-
-    @cached_property
-    def ordered(self) -> Floats:
-        """What is known of the units in ``order``."""
-        return self.known[self.order]
-
-    @cached_property
-    def sizes(self) -> Floats:
-        """Sizes of all units of each stratum together."""
-        return np.array([part.sum() for part in np.split(self.ordered[:, 1], self.first[1:-1])])
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Units that ran, and what they did.
-
-    Parameters
-    ----------
-    strata : Strata
-    taken : ndarray, (strata,), int64
-        Units that ran of each stratum.
-    rows : ndarray, (sum of taken, events)
-        Of the units ``drawn(strata, taken)``.
-    """
-
-    strata: Strata
-    taken: Integers
-    rows: Integers
-
-    @property
-    def complete(self) -> bool:
-        """Whether all units ran."""
-        return bool((self.taken == self.strata.units).all())
-
-
-def t_quantile(freedom: Floats) -> Floats:
-    """Quantile of Student's t at 97.5 % (Cornish-Fisher, Abramowitz & Stegun 26.7.5; tabulated below 5)."""
-    nu = np.maximum(np.asarray(freedom, np.float64), 1.0)
-    z = _Z
-    series = (
-        z
-        + (z**3 + z) / (4 * nu)
-        + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * nu**2)
-        + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * nu**3)
-    )
-    small = np.interp(nu, [1.0, 2.0, 3.0, 4.0], _QUANTILES)
-    return np.where(nu <= len(_QUANTILES), small, series)
-
-
-def make_strata(size: NDArray[np.generic], seed: list[int], *more: NDArray[np.generic]) -> Strata:
-    """Cut units into strata by size, and shuffle each.
-
-    Parameters
-    ----------
-    size : ndarray, (units,)
-        Not negative.
-    seed : list of int
-    *more : ndarray, (units,)
-        Further things known, of which some events may be proportional.
-    """
-    columns = [np.ones(len(size)), *(column.astype(np.float64) for column in (size, *more))]
-    known = np.stack([column / (column.mean() or 1.0) for column in columns], axis=1)
-    ascending = np.argsort(known[:, 1], kind="stable")
-    split = max(0, len(known) - CERTAIN)
-    rest, certain = ascending[:split], ascending[split:]
-    cuts = _cuts(known[rest, 1])
-    random = np.random.default_rng(seed)
-    parts = [certain, *(random.permutation(part) for part in np.split(rest, cuts) if len(part))]
-    first = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
-    return Strata(known, np.concatenate(parts).astype(np.int64), first.astype(np.int64))
-
-
-def _cuts(size: Floats) -> Integers:
-    """Places where ascending sizes are cut: after the empty ones, then by ratio, no stratum below ``FEWEST``."""
-    empty = int(np.searchsorted(size, 0.0, side="right"))
-    if empty == len(size):
-        return np.zeros(0, np.int64)
-    level = np.floor(np.log(size[empty:] / size[empty]) / np.log(STEP) + 1e-9)
-    cuts = [empty] if empty else []
-    for cut in empty + np.flatnonzero(np.diff(level)) + 1:
-        if cut - (cuts[-1] if cuts else 0) >= FEWEST and len(size) - cut >= FEWEST:
-            cuts.append(int(cut))
-    return np.array(cuts, np.int64)
-
-
-def pilot(strata: Strata) -> Integers:
-    """Units that the first sample takes of each stratum."""
-    total = strata.sizes
-    share = total / max(total[1:].sum(), 1e-300)
-    taken: Integers = np.minimum(strata.units, np.maximum(PILOT_EACH, np.ceil(PILOT * share))).astype(np.int64)
-    taken[0] = strata.units[0]
-    return taken
-
-
-def drawn(strata: Strata, taken: Integers) -> Integers:
-    """Units of a sample, stratum after stratum."""
-    units: Integers = strata.order[_places(strata, taken)]
-    return units
-
-
-def _places(strata: Strata, taken: Integers) -> Integers:
-    """Places in ``order`` of a sample."""
-    return np.repeat(strata.first[:-1] - np.cumsum(taken) + taken, taken) + np.arange(taken.sum())
 
 
 @dataclass(frozen=True)
@@ -210,7 +44,7 @@ class _Fit:
 
 def _fit(sample: Sample, values: Floats) -> _Fit:
     strata, taken = sample.strata, sample.taken
-    known = strata.ordered[_places(strata, taken)]
+    known = strata.ordered[places(strata, taken)]
     factors, leverage = _factors(sample, known, values)
     residual = values - _product(known, factors)
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
@@ -349,7 +183,7 @@ def expanded(sample: Sample) -> Integers:
     values = sample.rows.astype(np.float64)
     fit = _fit(sample, values)
     ran = np.zeros(len(strata.order), np.bool_)
-    ran[_places(strata, taken)] = True
+    ran[places(strata, taken)] = True
     rows = _product(strata.ordered[~ran], fit.factors) + np.repeat(fit.mean, strata.units - taken, axis=0)
     np.maximum(rows, 0.0, out=rows)
     sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)

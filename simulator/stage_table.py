@@ -9,7 +9,7 @@ from models.events import INSTRUCTION_CLASSES, MachineEvent
 from models.fixed_function import PipeLaunch
 from models.launch import Launch
 from models.timing import Timing
-from simulator.sampling import Estimate
+from simulator.estimate import Estimate
 from simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:

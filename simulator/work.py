@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from models.fixed_function import PipeLaunch
 from models.launch import Stream
-from simulator.sampling import Sample
+from simulator.strata import Sample
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,11 @@ import pytest
 
 from models.errors import TilestampError
 from simulator import simulate
+from simulator.estimate import Estimate, t_quantile
 from simulator.run import Run
 from simulator.sampler import Sampler
-from simulator.sampling import Estimate, Sample, drawn, enlarged, expanded, make_strata, pilot, t_quantile, totals
+from simulator.sampling import enlarged, expanded, totals
+from simulator.strata import Sample, drawn, make_strata, pilot
 from simulator.work import Work
 
 SEEDS = 200
