@@ -20,7 +20,8 @@ from models.launch import Stream
 from models.simt import Simt
 from simulator.parallel import for_parts, parts_of
 from simulator.stages.borrow import row_of
-from simulator.stages.laine2011.bin_raster_batch import BIN_SEGMENT, BLOCK, ENTRY_BYTES, BinInput, _play_batch
+from simulator.stages.laine2011.bin_raster_batch import BinInput, _play_batch
+from simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
 from simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
 from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 from simulator.work import Work

@@ -1,0 +1,117 @@
+"""What bin raster counts: loads, atomics, segments and their writes, and what a round waits for."""
+
+from numba import njit
+
+from simulator.stages.laine2011.bin_raster_cover import WARP
+from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+
+BLOCK = 512  # threads, and triangles of a round
+BIN_SEGMENT = 512  # entries
+ENTRY_BYTES = 4
+SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x 2, anything
+
+
+@njit(cache=True, nogil=True)
+def _count_load(events, loads, segments, size):
+    events[BinRasterEvent.LOAD] += loads
+    events[BinRasterEvent.LOAD_TRANSACTIONS] += segments
+    events[BinRasterEvent.LOAD_BYTES] += size
+
+
+@njit(cache=True, nogil=True)
+def _count_atomic(events, executed):
+    """One thread's global atomic: a draw, or the allocation of a round's segments."""
+    events[BinRasterEvent.ATOMIC] += executed
+    events[BinRasterEvent.ATOMIC_LANES] += executed
+    events[BinRasterEvent.ATOMIC_REQUESTS] += executed
+    events[BinRasterEvent.ATOMIC_DEPTH] += executed
+
+
+@njit(cache=True, nogil=True)
+def _count_visible(subtriangles, events):
+    """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
+    most = 0
+    for n in subtriangles:
+        most = max(most, int(n))
+    events[BinRasterEvent.VISIBLE_WARPS] += most > 0
+    events[BinRasterEvent.MULTI_WARPS] += most > 1
+
+
+@njit(cache=True, nogil=True)
+def _count_bins(bins, events):
+    """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
+    warps = (bins + WARP - 1) // WARP
+    events[BinRasterEvent.BIN_WARPS] += warps
+    events[BinRasterEvent.BIN_LANES] += bins
+    events[BinRasterEvent.MASK_CLEARS] += BLOCK // WARP * warps
+    events[BinRasterEvent.MASK_WARPS] += BLOCK // WARP
+    events[BinRasterEvent.MASK_LANES] += BLOCK // WARP * min(bins, WARP)
+
+
+@njit(cache=True, nogil=True)
+def _count_longest(walk, steps, paths, events):
+    """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
+    events[BinRasterEvent.LONGEST_WALKS] += walk
+    events[BinRasterEvent.LONGEST_SLOW] += steps
+    events[BinRasterEvent.SINGLE_ROUNDS] += paths & 1
+    events[BinRasterEvent.FAST_ROUNDS] += (paths >> FAST) & 1
+    events[BinRasterEvent.SLOW_ROUNDS] += (paths >> SLOW) & 1
+
+
+@njit(cache=True, nogil=True)
+def _count_segments(given, counts, scratch, events):
+    """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
+
+    Its link is written where the last one ends; the new one's own link and count stand beside those of its neighbours.
+    """
+    before = scratch.before
+    fresh, warps, stores = 0, 0, 0
+    for first in range(0, counts.size, WARP):
+        mine = 0
+        for b in range(first, min(first + WARP, counts.size)):
+            if _segments(counts[b]) > _segments(before[b]):
+                scratch.segment[b] = scratch.warps[1] + fresh + mine
+                mine += 1
+            before[b] = counts[b]
+        if mine > 0:
+            stores += mine + 2 * _sectors(scratch.warps[1] + fresh, mine, given.segment_bytes)
+        fresh, warps = fresh + mine, warps + (mine > 0)
+    scratch.warps[1] += fresh
+    _count_store(events, stores, given.segment_bytes)
+    events[BinRasterEvent.SEGMENTS] += fresh
+    events[BinRasterEvent.ALLOC_WARPS] += warps
+    events[BinRasterEvent.SHARED_ATOMIC] += warps
+    events[BinRasterEvent.ALLOC_ROUNDS] += fresh > 0
+    _count_atomic(events, fresh > 0)
+
+
+@njit(cache=True, nogil=True)
+def _count_closing(given, counts, scratch, events):
+    """Count the open segments at the end of a batch, and the writes of their counts."""
+    for first in range(0, counts.size, WARP):
+        closing, last = 0, -1
+        stores = 0
+        for b in range(first, min(first + WARP, counts.size)):
+            if counts[b] % BIN_SEGMENT:
+                closing += 1
+                here = scratch.segment[b] * ENTRY_BYTES // given.segment_bytes
+                stores, last = stores + (here != last), here
+        events[BinRasterEvent.CLOSING_WARPS] += closing > 0
+        _count_store(events, stores, given.segment_bytes)
+
+
+@njit(cache=True, nogil=True)
+def _count_store(events, segments, size):
+    events[BinRasterEvent.STORE_TRANSACTIONS] += segments
+    events[BinRasterEvent.STORE_BYTES] += segments * size
+
+
+@njit(cache=True, nogil=True)
+def _sectors(first, words, size):
+    """Memory segments of ``words`` words from word ``first`` on."""
+    return ((first + words) * ENTRY_BYTES - 1) // size - first * ENTRY_BYTES // size + 1
+
+
+@njit(cache=True, nogil=True)
+def _segments(entries):
+    return (entries + BIN_SEGMENT - 1) // BIN_SEGMENT
