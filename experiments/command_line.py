@@ -55,7 +55,7 @@ def _run(arguments: list[str]) -> int:
     """Run one command; bad input is one sentence."""
     from cyclopts import CycloptsError
 
-    from models.errors import TilestampError
+    from tilestamp.models.errors import TilestampError
 
     try:
         _app()(arguments, exit_on_error=False, print_error=False, result_action="return_value")
@@ -69,11 +69,11 @@ def _app() -> "App":
     """Put the commands together."""
     from cyclopts import App
 
-    from experiments.commands.catalogue import catalogue
-    from experiments.commands.measure_machine import measure_machine
-    from experiments.commands.render import render
-    from experiments.commands.reproduce import reproduce
-    from experiments.commands.validate import validate
+    from tilestamp.experiments.commands.catalogue import catalogue
+    from tilestamp.experiments.commands.measure_machine import measure_machine
+    from tilestamp.experiments.commands.render import render
+    from tilestamp.experiments.commands.reproduce import reproduce
+    from tilestamp.experiments.commands.validate import validate
 
     app = App(name="tilestamp", help=HELP, help_format="markdown", suppress_keyboard_interrupt=False)
     for command in (render, reproduce, validate, measure_machine):

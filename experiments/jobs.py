@@ -16,10 +16,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.registry import load_experiment
-from experiments.result import Figure, Result
-from experiments.write import SCRATCH, write_result
-from models.errors import TilestampError
+from tilestamp.experiments.registry import load_experiment
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.write import SCRATCH, write_result
+from tilestamp.models.errors import TilestampError
 
 if TYPE_CHECKING:
     from multiprocessing.queues import SimpleQueue

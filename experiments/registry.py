@@ -7,8 +7,8 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from experiments.result import Result
-from models.errors import TilestampError
+from tilestamp.experiments.result import Result
+from tilestamp.models.errors import TilestampError
 
 Progress = Callable[[str], None]
 Experiment = Callable[[Progress], Result]
@@ -30,7 +30,7 @@ def describe_folder(folder: str) -> str:
     """First line of the docstring of a folder of experiments; its name where there is none."""
     if not (FOLDER / folder / "__init__.py").is_file():
         return folder
-    return (import_module(f"experiments.{folder}").__doc__ or folder).strip().splitlines()[0]
+    return (import_module(f"tilestamp.experiments.{folder}").__doc__ or folder).strip().splitlines()[0]
 
 
 def load_experiment(name: str) -> Experiment:
@@ -71,4 +71,4 @@ def select(names: tuple[str, ...], *, everything: bool = False) -> list[str]:
 
 
 def _module(name: str) -> str:
-    return f"experiments.{name.replace('/', '.')}"
+    return f"tilestamp.experiments.{name.replace('/', '.')}"

@@ -9,10 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.registry import describe_folder
-from experiments.result import Cell, Result
-from models.compile_cache import source_digest
-from reports.page import write_page
+from tilestamp.experiments.registry import describe_folder
+from tilestamp.experiments.result import Cell, Result
+from tilestamp.reports.page import write_page
+from tilestamp.simulator.manifest import source_digest
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,16 +13,15 @@ is counted by the caller, by ``address // CHUNK_BYTES``: the table ``Work.atomic
 
 from typing import Any
 
-from numba import njit
-
-from models.simt import AtomicMerge
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import AtomicMerge
 
 SECTOR = int(AtomicMerge.SECTOR)
 SECTOR_BYTES = 32
 CHUNK_BYTES = 32  # granularity of Launch.atomic_requests
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_atomics(addresses: Any, lanes: int, merge: int) -> tuple[int, int, int, int]:
     """Active lanes, requests, conflicts and depth of one atomic instruction.
 
@@ -57,28 +56,28 @@ def count_atomics(addresses: Any, lanes: int, merge: int) -> tuple[int, int, int
     return active, merged, conflicts, depth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def requests(addresses: Any, lanes: int, merge: int) -> int:
     """Count the requests of one atomic instruction after merging."""
     count: int = count_atomics(addresses, lanes, merge)[1]
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def conflicts(addresses: Any, lanes: int) -> int:
     """Count the lanes at an address that an earlier lane has."""
     count: int = count_atomics(addresses, lanes, 0)[2]
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def depth(addresses: Any, lanes: int) -> int:
     """Count the lanes at the most wanted address."""
     crowd: int = count_atomics(addresses, lanes, 0)[3]
     return crowd
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def add_requests(addresses: Any, lanes: int, merge: int, base: int, chunks: Any) -> None:
     """Add the requests of one instruction to a table by 32-byte chunk: who queues where.
 
@@ -101,7 +100,7 @@ def add_requests(addresses: Any, lanes: int, merge: int, base: int, chunks: Any)
         chunks[(addresses[i] - base) >> 5] += busiest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sector_requests(addresses: Any, lanes: int) -> int:
     """Sum, over the sectors touched, the lanes at their most wanted address."""
     total = 0
@@ -113,7 +112,7 @@ def _sector_requests(addresses: Any, lanes: int) -> int:
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sector(addresses: Any, first: int, lanes: int, served: int) -> tuple[int, int]:
     """Mark the lanes in the sector of lane ``first`` as served; count those at its most wanted address."""
     most = 1

@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from models.bounds import Asked, asked_of, longest, roofline
-from models.fidelity_bound import latest_end
-from models.fixed_function import PipeLaunch, pipe_time
-from models.launch import Launch
-from models.machine import Machine
-from models.schedule import Loads, loads, played, start_up
-from models.timing import Timing
-from models.traffic import Traffic
+from tilestamp.models.bounds import Asked, asked_of, longest, roofline
+from tilestamp.models.fidelity_bound import latest_end
+from tilestamp.models.fixed_function import PipeLaunch, pipe_time
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.schedule import Loads, loads, played, start_up
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic
 
 ERROR = 0.05  # of time, where none is asked for: below what separates the models from silicon
 

@@ -11,10 +11,10 @@ An access is an int64 array of word indices, negative where a lane is inactive.
 
 from typing import Any
 
-from numba import njit
+from tilestamp.models.kernel import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bank_passes(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     """Count the passes of one shared load or store: by group of ``bank_lanes``, the most distinct words in one bank.
 
@@ -31,7 +31,7 @@ def bank_passes(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     return passes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def atomic_passes(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     """Count the passes of one shared atomic: as ``bank_passes``, but lanes at the same word take a pass each."""
     passes = 0
@@ -40,7 +40,7 @@ def atomic_passes(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     return passes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bank_replays(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     """Count the passes beyond the one that a group of lanes needs anyway: BANK_REPLAYS of a load or store."""
     replays = 0
@@ -49,7 +49,7 @@ def bank_replays(words: Any, lanes: int, banks: int, bank_lanes: int) -> int:
     return replays
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _group_passes(words: Any, first: int, end: int, banks: int, broadcast: bool) -> int:
     """Most words, distinct if they are broadcast, that the lanes first..end-1 want from one bank."""
     most = 0

@@ -15,19 +15,19 @@ launch    overhead of the kernel
 
 time = launch + the largest of the others. The servers of the whole chip (dram, l2, atomic, queue) stand idle until the
 first requests reach them and end before the last answer is back, so a unit's chain comes on top of theirs. It supposes
-that the units are many and alike; ``models.schedule`` does not.
+that the units are many and alike; ``tilestamp.models.schedule`` does not.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from models.demand import Demand, demand
-from models.launch import Launch
-from models.machine import Machine
-from models.occupancy import Residency, residency
-from models.timing import Timing
-from models.traffic import Traffic
+from tilestamp.models.demand import Demand, demand
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.occupancy import Residency, residency
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic
 
 SERVERS = ("dram", "l2", "atomic", "queue")  # of the whole chip
 
@@ -51,7 +51,7 @@ def asked_of(launch: Launch, machine: Machine, moved: Traffic) -> Asked:
     launch : Launch
     machine : Machine
     moved : Traffic
-        Its bytes, from ``models.traffic``.
+        Its bytes, from ``tilestamp.models.traffic``.
 
     Raises
     ------

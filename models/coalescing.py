@@ -18,9 +18,8 @@ lane is inactive**, and the number of lanes in use. All functions run inside sta
 
 from typing import Any
 
-from numba import njit
-
-from models.simt import Coalescing
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Coalescing
 
 HALF_WARP_SEGMENTS = int(Coalescing.HALF_WARP_SEGMENTS)
 WARP_LINES = int(Coalescing.WARP_LINES)
@@ -31,7 +30,7 @@ WORD_BYTES = 4
 WARP_BYTES = 128  # consecutive words of 32 lanes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
     """Transactions of one memory instruction, and their bytes.
 
@@ -67,7 +66,7 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     return count, total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _segments(
     addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
 ) -> tuple[int, int]:
@@ -92,7 +91,7 @@ def _segments(
     return count, total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shrunk(low: int, high: int, segment_bytes: int) -> int:
     """Bytes of the smallest aligned segment, down to 32 bytes, that still holds low..high-1."""
     size = segment_bytes
@@ -101,7 +100,7 @@ def _shrunk(low: int, high: int, segment_bytes: int) -> int:
     return size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
     """Transactions, and their bytes, when consecutive lanes access consecutive 4-byte words.
 
@@ -119,7 +118,7 @@ def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
     return warps * count + n, warps * total + b
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _one_warp(start: int, size: int, rule: int) -> tuple[int, int]:
     """``contiguous`` for at most 128 bytes."""
     if rule != HALF_WARP_SEGMENTS:

@@ -1,81 +1,47 @@
-"""Where compiled kernels are kept: one folder for each state of the sources.
-
-Numba's disk cache looks only at the file of the kernel itself: it goes stale when a helper in another file
-changes, freezes module constants, and ignores the bounds-check flag. So the folder is named after everything
-that a compiled kernel depends on (the version, the flags, the processor, and a digest of all our sources),
-and it is chosen before any kernel is imported. A folder that the user names in NUMBA_CACHE_DIR is left alone.
-"""
+"""Where compiled kernels are kept: one folder for each version of Numba and each setting that changes what it makes."""
 
 import contextlib
-import hashlib
 import importlib.metadata
 import os
-import platform
-import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-PACKAGES = ("models", "simulator")  # the packages that hold kernels
-STALE_DAYS = 14  # folders of other sources that nobody has opened for so long are removed
-_OURS = "TILESTAMP_COMPILE_CACHE"  # the folder that we chose: a child process with other flags chooses again
-_FLAGS = ("NUMBA_BOUNDSCHECK", "NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME")
-
-
-@cache
-def source_digest() -> str:
-    """Digest of the Python sources of ``models`` and ``simulator``: 16 hexadecimal digits, also used in manifests."""
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
+STALE_DAYS = 14  # what was not loaded for so long is removed
+_FLAGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")
+_PRUNED = "pruned"  # a file whose age says when stale kernels were last removed
+_listeners: list[Callable[[str], None]] = []
 
 
 def cache_folder() -> Path:
-    """Folder in which Numba keeps compiled kernels."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(named) if named else _user_cache() / "tilestamp" / _key()
+    """Folder of compiled kernels: named in NUMBA_CACHE_DIR, or of the user's caches; a temporary one if that fails."""
+    return _folder(os.environ.get("NUMBA_CACHE_DIR", ""), tuple(os.environ.get(flag, "") for flag in _FLAGS))
 
 
-def _named_by_user() -> bool:
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    return bool(named) and named != os.environ.get(_OURS)
-
-
-def is_cold() -> bool:
-    """Whether no kernel has been compiled into the cache folder yet: the first run will take its time."""
-    return next(cache_folder().rglob("*.nbi"), None) is None
-
-
-def set_up() -> Path:
-    """Point Numba at the cache folder; call it before any kernel is imported.
-
-    Returns
-    -------
-    Path
-        The folder, made where it did not exist; a folder for temporary files where the cache cannot be written.
-    """
-    if _named_by_user():
-        return cache_folder()
-    folder = _user_cache() / "tilestamp" / _key()
+@cache
+def _folder(named: str, flags: tuple[str, ...]) -> Path:
+    key = "-".join(filter(None, ("numba", importlib.metadata.version("numba"), *flags)))
+    folder = (Path(named) if named else _user_cache() / "tilestamp") / key
     if not _make_writable(folder):
-        folder = Path(tempfile.gettempdir()) / f"tilestamp-{_user_id()}" / _key()
+        folder = Path(tempfile.gettempdir()) / f"tilestamp-{_user_id()}" / key
         _make_writable(folder)
     _prune(folder)
-    os.environ["NUMBA_CACHE_DIR"] = os.environ[_OURS] = str(folder)
-    if "numba" in sys.modules:  # it read its settings when it was imported
-        sys.modules["numba"].config.CACHE_DIR = str(folder)
     return folder
 
 
-def _key() -> str:
-    flags = "".join("1" if os.environ.get(flag, "0") not in {"", "0"} else "0" for flag in _FLAGS[:2])
-    processor = os.environ.get(_FLAGS[2]) or platform.machine() or "cpu"
-    return f"{importlib.metadata.version('numba')}-{flags}{processor}-{source_digest()}"
+def on_compiling(listener: Callable[[str], None]) -> None:
+    """Tell ``listener`` the name of each kernel that is about to be compiled, as ``module.kernel``."""
+    _listeners.append(listener)
+
+
+def note_compiling(function: Callable[..., Any]) -> None:
+    """Say that a kernel is about to be compiled."""
+    for listener in _listeners:
+        listener(f"{function.__module__.rpartition('.')[2]}.{function.__name__}")
 
 
 def _user_cache() -> Path:
@@ -96,15 +62,19 @@ def _make_writable(folder: Path) -> bool:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-        os.utime(folder)  # the mark by which pruning sees that it is in use
     except OSError:
         return False
     return True
 
 
-def _prune(current: Path) -> None:
-    """Remove the folders of other sources that have not been opened for a while."""
+def _prune(folder: Path) -> None:
+    """Once a day, remove the kernels that were not loaded for a while; an index is touched when it is."""
+    mark, now = folder / _PRUNED, time.time()
     with contextlib.suppress(OSError):
-        for folder in current.parent.iterdir():
-            if folder != current and folder.is_dir() and time.time() - folder.stat().st_mtime > STALE_DAYS * 86400:
-                shutil.rmtree(folder, ignore_errors=True)
+        if mark.exists() and now - mark.stat().st_mtime < 86400:
+            return
+        mark.touch()
+        for index in folder.glob("*.nbi"):
+            if now - index.stat().st_mtime > STALE_DAYS * 86400:
+                for file in folder.glob(f"{index.stem}.*"):
+                    file.unlink()

@@ -22,11 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.events import INSTRUCTION_CLASSES
-from models.events import MachineEvent as E
-from models.launch import Launch
-from models.machine import Machine
-from models.traffic import Traffic
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.events import MachineEvent as E
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.traffic import Traffic
 
 Cycles = NDArray[np.float64]
 

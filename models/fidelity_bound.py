@@ -23,9 +23,9 @@ its SM can hold; or any one unit ends last, and its own start and run count. The
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from models.schedule import Loads
+from tilestamp.models.kernel import kernel
+from tilestamp.models.schedule import Loads
 
 
 class Latest(NamedTuple):
@@ -49,7 +49,7 @@ def latest_end(units: Loads) -> Latest:
     return Latest(*_latest_end(*units[:3], units.places[units.places > 0], units.interval))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _latest_end(sm: Any, chip: Any, alone: Any, taken: Any, interval: float) -> tuple[float, float, bool]:
     """Cycles, tail and whether units wait, of the SMs that hold any."""
     units = len(alone)
@@ -75,7 +75,7 @@ def _latest_end(sm: Any, chip: Any, alone: Any, taken: Any, interval: float) -> 
     return end, end - start, waiting
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _serve(served: Any, sm: Any, chip: Any, alone: Any, taken: Any, together: int, waiting: bool) -> float:
     """Add the cycles that each unit keeps the chip's servers; return the share of the SMs' own time that stays."""
     servers = chip.shape[1]
@@ -97,7 +97,7 @@ def _serve(served: Any, sm: Any, chip: Any, alone: Any, taken: Any, together: in
     return stretch
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _never_fuller(chip: Any, k: int, busiest: int) -> bool:
     """Tell whether every unit asks more of the busiest server than of server k."""
     for i in range(len(chip)):  # noqa: SIM110 - plain loops compile to plain code
@@ -106,7 +106,7 @@ def _never_fuller(chip: Any, k: int, busiest: int) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _server_load(chip: Any, k: int, sm: Any, alone: Any, taken: Any, together: int) -> tuple[float, float]:
     """Lowest load of a server while every place is taken, and its highest at any time.
 
@@ -127,7 +127,7 @@ def _server_load(chip: Any, k: int, sm: Any, alone: Any, taken: Any, together: i
     return low, high
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _chord(low: float, high: float) -> tuple[float, float]:
     """Intercept and slope of the chord of max(1, x) over [low, high]."""
     if high <= 1.0:
@@ -138,7 +138,7 @@ def _chord(low: float, high: float) -> tuple[float, float]:
     return 1.0 - slope * low, slope
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _starts(full: Any, served: Any, alone: Any, interval: float, left: float, crowded: float) -> tuple[float, float]:
     """Latest start of the last unit, and latest end of any, with all that the chip's servers have left to do then.
 
@@ -163,7 +163,7 @@ def _starts(full: Any, served: Any, alone: Any, interval: float, left: float, cr
     return start, end
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sum_highest(values: Any, count: int, sign: float) -> float:
     """Sum of the ``count`` highest, times their sign, by a heap of them whose lowest is on top."""
     count = min(count, len(values))

@@ -7,11 +7,11 @@ A launch of the pipe says how many items pass each unit, by the unit's name in t
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.machine import Machine
-from models.timing import Timing
-from models.traffic import Traffic
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch import Stream
+from tilestamp.models.machine import Machine
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic
 
 
 @dataclass(frozen=True)

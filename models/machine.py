@@ -16,9 +16,9 @@ from typing import Any, Literal
 import msgspec
 import msgspec.structs
 
-from models.errors import TilestampError
-from models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
-from models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 
 FOLDER = Path(__file__).parent / "machines"
 Provenance = Literal["published", "measured", "derived", "fitted", "assumed"]

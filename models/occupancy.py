@@ -8,8 +8,8 @@ compute capability (CUDA 4.2 guide, section 4.2). Registers come in one piece fo
 
 from dataclasses import dataclass
 
-from models.errors import TilestampError
-from models.machine import Machine
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import Machine
 
 
 @dataclass(frozen=True)

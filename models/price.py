@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from models.auto import auto
-from models.bounds import bounds
-from models.errors import TilestampError
-from models.fixed_function import PipeLaunch, pipe_time
-from models.launch import Launch
-from models.machine import Machine
-from models.occupancy import residency
-from models.schedule import schedule
-from models.timing import Timing
-from models.traffic import Traffic, traffic
+from tilestamp.models.auto import auto
+from tilestamp.models.bounds import bounds
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.fixed_function import PipeLaunch, pipe_time
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.occupancy import residency
+from tilestamp.models.schedule import schedule
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic, traffic
 
 Fidelity = Literal["counts", "bounds", "auto", "schedule"]
 FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "auto", "schedule")
@@ -30,9 +30,9 @@ def price(
     machine : Machine
     fidelity : {"counts", "bounds", "auto", "schedule"}
         No time at all; a roofline for each launch; the cheaper of its neighbours, launch by launch
-        (``models.auto``); units of work played on the SMs.
+        (``tilestamp.models.auto``); units of work played on the SMs.
     error : float
-        Relative error of time that ``auto`` may make against ``schedule``; 0 for ``models.auto.ERROR``.
+        Relative error of time that ``auto`` may make against ``schedule``; 0 for ``tilestamp.models.auto.ERROR``.
 
     Returns
     -------

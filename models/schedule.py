@@ -19,15 +19,15 @@ what a roofline cannot: idle SMs when units are few, SMs that are half empty, an
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.bounds import Asked, asked_of, longest, slots, timing
-from models.demand import Demand
-from models.launch import Launch
-from models.machine import Machine
-from models.timing import Timing
-from models.traffic import Traffic
+from tilestamp.models.bounds import Asked, asked_of, longest, slots, timing
+from tilestamp.models.demand import Demand
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic
 
 MOST_UNITS = 1_000_000  # beyond, neighbours are played as one unit
 SERVERS = 4  # of the whole chip: DRAM, L2, atomic units together, the fullest atomic unit
@@ -126,7 +126,7 @@ def _grouped(asked: Demand) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     return np.ascontiguousarray(sm), np.ascontiguousarray(chip), np.ascontiguousarray(alone)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple[float, float, int]:
     """Play all units; return the end, the start of the last unit (cycles), and the SMs that got any.
 
@@ -205,7 +205,7 @@ def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple
     return time, last_start, min(len(alone), int(np.count_nonzero(places)))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _change(
     s: int, i: int, sign: float, sm: Any, chip: Any, alone: Any, load: Any, server: Any, chip_load: Any
 ) -> None:
@@ -220,7 +220,7 @@ def _change(
         server[s, k] = loaded
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _next_end(ends: Any, s: int, places: int) -> int:
     """Place of SM s whose unit ends first."""
     best = 0
@@ -230,7 +230,7 @@ def _next_end(ends: Any, s: int, places: int) -> int:
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _tournament(leaves: int) -> Any:
     """Tree over equal leaves: ``first[1]`` is the winner, the lowest leaf wins a tie."""
     first = np.zeros(2 * leaves, np.int64)
@@ -241,7 +241,7 @@ def _tournament(leaves: int) -> Any:
     return first
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _replay(first: Any, wake: Any, leaves: int, s: int) -> None:
     """Settle again the games of leaf s, after ``wake[s]`` changed."""
     node = (leaves + s) >> 1

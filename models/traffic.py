@@ -17,14 +17,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from models.events import MachineEvent
-from models.launch import Launch, Stream
+from tilestamp.models.events import MachineEvent
+from tilestamp.models.launch import Launch, Stream
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from models.fixed_function import PipeLaunch
-    from models.machine import Machine
+    from tilestamp.models.fixed_function import PipeLaunch
+    from tilestamp.models.machine import Machine
 
 L1_HOLDS_LOADS = 7.0  # compute capability from which L1 keeps global loads by default; before, a cache of 48 KB or none
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.style import PALETTE, figure
+from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd

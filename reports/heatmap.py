@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.style import HEAT, figure
+from tilestamp.reports.style import HEAT, figure
 
 
 def heat_map(

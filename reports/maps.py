@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.style import HEAT, figure
+from tilestamp.reports.style import HEAT, figure
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.frontier_plot import MARKERS
-from reports.style import PALETTE, figure
+from tilestamp.reports.frontier_plot import MARKERS
+from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reports.style import PALETTE, figure
+from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.style import HEAT, figure
+from tilestamp.reports.style import HEAT, figure
 
 RED = (220, 0, 30)
 GROWN = 1  # pixels around a wrong one that are drawn red too, so that single pixels can be seen

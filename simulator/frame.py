@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.work import FixedFunctionWork, Work
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 REMARKS = {  # a fact that counts what was lost, repeated or left to chance: the sentence about it
     "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn",

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from models.demand import demand
-from models.events import INSTRUCTION_CLASSES
-from models.launch import Launch
-from models.machine import Machine
-from models.timing import Timing
-from models.traffic import Traffic
-from simulator.estimate import Estimate, Totals
-from simulator.sampling import totals
-from simulator.work import FixedFunctionWork, Work
+from tilestamp.models.demand import demand
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import Traffic
+from tilestamp.simulator.estimate import Estimate, Totals
+from tilestamp.simulator.sampling import totals
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 UNPLAYED = 0.45  # of the time beyond the roofline: measured over seeds (killeroo and teapot on a GTX 280)
 TERMS = {  # of a launch's time, that differ from unit to unit: column of Demand

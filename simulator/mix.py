@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
-from models.launch import Launch
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
+from tilestamp.models.launch import Launch
+from tilestamp.simulator.work import Work
 
 MIXES = Path(__file__).parent / "mixes"
 PROVENANCES = ("published", "measured", "disassembled", "derived", "fitted", "assumed")

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.stages.laine2011.bin_raster import bin_raster
-from simulator.stages.laine2011.coarse_raster import coarse_raster
-from simulator.stages.laine2011.fine_raster import fine_raster
-from simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
-from simulator.stages.laine2011.triangle_setup import MAX_SIZE, MAX_SUBTRIANGLES, triangle_setup
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.laine2011.bin_raster import bin_raster
+from tilestamp.simulator.stages.laine2011.coarse_raster import coarse_raster
+from tilestamp.simulator.stages.laine2011.fine_raster import fine_raster
+from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SIZE, MAX_SUBTRIANGLES, triangle_setup
 
 
 def rasterize(pos: NDArray[np.float32], tri: NDArray[np.int32], resolution: tuple[int, int]) -> NDArray[np.float32]:

@@ -1,6 +1,6 @@
 """Threads over parts of a kernel's work: the kernel is compiled once, without ``parallel=True``.
 
-A worker is ``@njit(cache=True, nogil=True)`` and takes ``(part, parts, *args)``; it works on its share, for example the
+A worker is ``@kernel`` and takes ``(part, parts, *args)``; it works on its share, for example the
 blocks ``part * blocks // parts`` to ``(part + 1) * blocks // parts``. Parts write to different places, or to private
 rows that are added up as integers, so that neither the number of threads nor their order changes a result. Numba's own
 ``prange`` does the same, but each such kernel costs seconds to compile, and Ctrl-C waits for the end of it.

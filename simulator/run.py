@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.fixed_function import PipeLaunch
-from models.launch import Launch
-from models.machine import Machine, load_machine
-from models.price import Fidelity, price
-from models.timing import Timing
-from simulator import intervals
-from simulator.estimate import Estimate
-from simulator.frame import Frame
-from simulator.mix import load_mix
-from simulator.stage_table import interval_table, stage_table
-from simulator.work import FixedFunctionWork, Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.fixed_function import PipeLaunch
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.models.price import Fidelity, price
+from tilestamp.models.timing import Timing
+from tilestamp.simulator import intervals
+from tilestamp.simulator.estimate import Estimate
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.stage_table import interval_table, stage_table
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.demand import demand
-from models.events import INSTRUCTION_CLASSES
-from models.launch import Stream
-from models.machine import Machine
-from models.traffic import Traffic
-from simulator.estimate import Floats, Integers
-from simulator.mix import load_mix
-from simulator.sampling import enlarged, expanded, totals
-from simulator.strata import Sample, drawn, make_strata, pilot
-from simulator.work import Work
+from tilestamp.models.demand import demand
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.launch import Stream
+from tilestamp.models.machine import Machine
+from tilestamp.models.traffic import Traffic
+from tilestamp.simulator.estimate import Floats, Integers
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.sampling import enlarged, expanded, totals
+from tilestamp.simulator.strata import Sample, drawn, make_strata, pilot
+from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")

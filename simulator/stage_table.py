@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.events import INSTRUCTION_CLASSES, MachineEvent
-from models.fixed_function import PipeLaunch
-from models.launch import Launch
-from models.timing import Timing
-from simulator.estimate import Estimate
-from simulator.work import FixedFunctionWork, Work
+from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
+from tilestamp.models.fixed_function import PipeLaunch
+from tilestamp.models.launch import Launch
+from tilestamp.models.timing import Timing
+from tilestamp.simulator.estimate import Estimate
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from models.fixed_function import PipeLaunch
-from models.launch import Stream
-from simulator.strata import Sample
+from tilestamp.models.fixed_function import PipeLaunch
+from tilestamp.models.launch import Stream
+from tilestamp.simulator.strata import Sample
 
 
 @dataclass(frozen=True)

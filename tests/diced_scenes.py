@@ -5,10 +5,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from models.simt import Simt
-from simulator.scenes import load_scene
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.dice import Grids, dice
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes import load_scene
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
 
 
 @cache

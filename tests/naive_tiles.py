@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.simt import AtomicMerge, Coalescing
+from tilestamp.models.simt import AtomicMerge, Coalescing
 
 F = np.float32
 

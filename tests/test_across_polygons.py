@@ -3,14 +3,19 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.stages.fatahalian2009.across_polygons import CHUNK, PACKINGS, AcrossPolygonsEvent, across_polygons
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape
-from simulator.stages.fatahalian2009.stamps_count import count_tests
 from tests import naive_ste
 from tests.test_stamps import GT200, HEIGHT, WIDTH, soup
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import (
+    CHUNK,
+    PACKINGS,
+    AcrossPolygonsEvent,
+    across_polygons,
+)
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 
 def draw(polygons, packing, spp=1):

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.atomics import add_requests, conflicts, count_atomics, depth, requests
-from models.simt import AtomicMerge
+from tilestamp.models.atomics import add_requests, conflicts, count_atomics, depth, requests
+from tilestamp.models.simt import AtomicMerge
 
 NONE, SECTOR = (int(rule) for rule in AtomicMerge)
 

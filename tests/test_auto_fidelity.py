@@ -5,19 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.auto import ERROR
-from models.bounds import asked_of, bounds, longest
-from models.errors import TilestampError
-from models.events import EVENTS, MachineEvent
-from models.fidelity_bound import latest_end
-from models.fixed_function import PipeLaunch
-from models.launch import Launch
-from models.machine import list_machines, load_machine
-from models.price import price
-from models.schedule import loads, played, schedule, start_up
-from models.traffic import Traffic, traffic
-from simulator import simulate
-from simulator.pipelines import pipeline_names
+from tilestamp import simulate
+from tilestamp.models.auto import ERROR
+from tilestamp.models.bounds import asked_of, bounds, longest
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.events import EVENTS, MachineEvent
+from tilestamp.models.fidelity_bound import latest_end
+from tilestamp.models.fixed_function import PipeLaunch
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import list_machines, load_machine
+from tilestamp.models.price import price
+from tilestamp.models.schedule import loads, played, schedule, start_up
+from tilestamp.models.traffic import Traffic, traffic
+from tilestamp.simulator.pipelines import pipeline_names
 
 ROUNDING = 1 + 1e-9
 GTX280, GTX480, H200 = (load_machine(name) for name in ("gtx280", "gtx480", "h200"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.banks import atomic_passes, bank_passes, bank_replays
+from tilestamp.models.banks import atomic_passes, bank_passes, bank_replays
 
 FERMI = (32, 32)  # banks, lanes that go together
 GT200 = (16, 16)

@@ -6,12 +6,12 @@ import numba
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import Coalescing, Simt
-from simulator.stages.laine2011.bin_raster import batch_size, bin_raster, initial_capacity
-from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
-from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests.naive_bins import bin_queues, random_setup, rounds_of
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.stages.laine2011.bin_raster import batch_size, bin_raster, initial_capacity
+from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 
 E = BinRasterEvent
 SCENES = [("bunny", 1024), ("bunny", 512), ("dragon100k", 512), ("teapot16k", 1024), ("soup2k", 512),

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, bit_mask
 from tests import naive_ste
 from tests.test_stamps import GT200, HEIGHT, WIDTH, soup
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, bit_mask
 
 
 def draw(polygons, kind, lanes, spp=1):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket, is_monotone
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket, is_monotone
 
 
 @pytest.mark.parametrize("scale", ["log", "linear"])

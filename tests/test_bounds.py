@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from models.bounds import bounds
-from models.errors import TilestampError
-from models.events import EVENTS, MachineEvent
-from models.fixed_function import PipeLaunch
-from models.launch import Launch, Stream
-from models.machine import altered, load_machine
-from models.price import price
-from models.traffic import Traffic, traffic
+from tilestamp.models.bounds import bounds
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.events import EVENTS, MachineEvent
+from tilestamp.models.fixed_function import PipeLaunch
+from tilestamp.models.launch import Launch, Stream
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.price import price
+from tilestamp.models.traffic import Traffic, traffic
 
 GTX280 = altered(
     load_machine("gtx280"),

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from numba import get_num_threads, set_num_threads
 
-from models.atomics import count_atomics
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch, send_requests
-from simulator.stages.eisenacher2010.bucket_count import BucketCountEvent as Event
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import BucketScanEvent, bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent, bucket_write
-from simulator.stages.eisenacher2010.tile_range import screen_tiles
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_buckets, naive_conflicts
+from tilestamp.models.atomics import count_atomics
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch, send_requests
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketCountEvent as Event
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import BucketScanEvent, bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent, bucket_write
+from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 H200 = Simt()

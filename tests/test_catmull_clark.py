@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.scenes.catmull_clark import levels_for_area, limit_positions, subdivide, surface_of
-from simulator.scenes.quad_cage import Cage, refine
 from tests.naive_ste import catmull_clark
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.catmull_clark import levels_for_area, limit_positions, subdivide, surface_of
+from tilestamp.simulator.scenes.quad_cage import Cage, refine
 
 CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -84,7 +84,7 @@ def test_a_cube_of_seven_rounds_has_98304_quads_of_its_six_faces():
 
 
 def test_bigguy_comes_from_the_cage_reader(shared):
-    from simulator.scenes.quad_cage import read_cage
+    from tilestamp.simulator.scenes.quad_cage import read_cage
 
     surface = subdivide(surface_of(read_cage(shared / "scenes" / "cages" / "bigguy.obj")), 2)
     assert len(surface.quads) == 1450 * 16

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.coalescing import contiguous, transactions
-from models.simt import Coalescing
+from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.simt import Coalescing
 
 SEGMENTS, LINES, SECTORS = (int(rule) for rule in Coalescing)
 IDLE = -1

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from models.simt import Simt
-from simulator.scenes.scene import Scene
-from simulator.stages.laine2011.bin_raster import bin_raster
-from simulator.stages.laine2011.coarse_raster import bin_order, coarse_raster, initial_capacity
-from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
-from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests.naive_bins import random_setup, tile_queues
 from tests.test_bin_raster import SCENES, gpu_input, measured
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.laine2011.bin_raster import bin_raster
+from tilestamp.simulator.stages.laine2011.coarse_raster import bin_order, coarse_raster, initial_capacity
+from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 
 E = CoarseRasterEvent
 

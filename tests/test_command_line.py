@@ -5,7 +5,7 @@ import json
 import pytest
 from PIL import Image
 
-from experiments.command_line import BAD_INPUT, run_command
+from tilestamp.experiments.command_line import BAD_INPUT, run_command
 
 SMALL = ["--size", "64x48"]
 
@@ -93,7 +93,7 @@ def test_an_interrupt_is_one_sentence_and_exit_code_130(capsys, monkeypatch):
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("simulator.simulation.simulate", interrupted)
+    monkeypatch.setattr("tilestamp.simulator.simulation.simulate", interrupted)
     assert run_command(["render", "teapot", *SMALL]) == 130
     assert "interrupted" in capsys.readouterr().err
 

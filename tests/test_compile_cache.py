@@ -1,69 +1,167 @@
-"""Compiled kernels live in a folder named after everything that they depend on."""
+"""A compiled kernel is kept under a name that says all that it depends on."""
 
+import importlib
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
-from models import compile_cache
+import numba
+import pytest
+
+from tilestamp.models import compile_cache
+
+compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled with NUMBA_DISABLE_JIT")
+
+SOURCES = {
+    "deepest.py": "FACTOR = 2\n",
+    "helper.py": "from kernel_project import deepest\nfrom tilestamp.models.kernel import kernel\n\n"
+    "@kernel\ndef scaled(x):\n    return x * deepest.FACTOR\n",
+    "stage.py": "from kernel_project.helper import scaled\nfrom tilestamp.models.kernel import kernel\n\n"
+    "@kernel\ndef stage(x):\n    return scaled(x) + 1\n\n"
+    "def driver(x):\n    return stage(x)\n",
+    "__init__.py": "",
+}
 
 
-def _folder_of_new_process(**environment):
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "TILESTAMP_"))}
-    code = "import models, numba; print(numba.config.CACHE_DIR)"
-    root = Path(compile_cache.__file__).parent.parent
-    done = subprocess.run(  # noqa: S603 - our own interpreter, our own code
-        [sys.executable, "-c", code], env=clean | environment, cwd=root, capture_output=True, text=True, check=True
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A package of three modules, each of which needs the next; and its compiled kernels in a folder of their own."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("tilestamp.models.kernel_digest.PACKAGE", "kernel_project")
+    folder = tmp_path / "kernel_project"
+    folder.mkdir()
+    for name, text in SOURCES.items():
+        (folder / name).write_text(text)
+    yield folder
+    _forget()
+
+
+def _forget():
+    for name in [name for name in sys.modules if name.startswith("kernel_project")]:
+        del sys.modules[name]
+    importlib.invalidate_caches()
+
+
+def _kernels_compiled(folder, monkeypatch):
+    """Import the package anew and run its driver: the answer, and the kernels that were compiled for it."""
+    _forget()
+    sys.dont_write_bytecode = True
+    listeners = []
+    monkeypatch.setattr(compile_cache, "_listeners", [listeners.append])
+    answer = importlib.import_module(f"{folder.name}.stage").driver(5)
+    return answer, sorted(listeners)
+
+
+def _edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+@compiled
+def test_what_was_compiled_is_loaded(project, monkeypatch):
+    assert _kernels_compiled(project, monkeypatch) == (11, ["helper.scaled", "stage.stage"])
+    assert _kernels_compiled(project, monkeypatch) == (11, [])
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("file", "old", "new", "answer"),
+    [
+        ("helper.py", "x * ", "3 + x * ", 14),  # an imported helper
+        ("deepest.py", "FACTOR = 2", "FACTOR = 7", 36),  # a module that only the helper imports
+    ],
+)
+def test_an_edit_of_what_a_kernel_reaches_is_seen(project, monkeypatch, file, old, new, answer):
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / file, old, new)
+    assert _kernels_compiled(project, monkeypatch) == (answer, ["helper.scaled", "stage.stage"])
+
+
+@compiled
+def test_an_edit_of_one_stage_compiles_only_it(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / "stage.py", "+ 1", "+ 2")
+    assert _kernels_compiled(project, monkeypatch) == (12, ["stage.stage"])
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("deepest.py", "FACTOR", "# a comment\nOTHER = 1\nFACTOR"),
+        ("helper.py", "    return", "    # a comment\n    return"),
+        ("stage.py", "def driver(x):", 'def driver(x):\n    """Run it."""'),
+    ],
+)
+def test_an_edit_that_no_kernel_sees_compiles_nothing(project, monkeypatch, file, old, new):
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / file, old, new)
+    assert _kernels_compiled(project, monkeypatch) == (11, [])
+
+
+@compiled
+def test_going_back_to_what_was_compiled_before_compiles_nothing(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / "deepest.py", "FACTOR = 2", "FACTOR = 7")
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / "deepest.py", "FACTOR = 7", "FACTOR = 2")
+    assert _kernels_compiled(project, monkeypatch) == (11, [])
+
+
+@compiled
+def test_the_order_of_the_fields_of_a_named_tuple_counts(project, monkeypatch):
+    (project / "pair.py").write_text(
+        "from typing import NamedTuple\n\nclass Pair(NamedTuple):\n    a: int\n    b: int\n"
     )
-    return Path(done.stdout.strip())
+    stage = "from kernel_project.pair import Pair\nfrom tilestamp.models.kernel import kernel\n\n"
+    stage += "@kernel\ndef stage(pair):\n    return 10 * pair.a + pair.b\n\n"
+    (project / "stage.py").write_text(stage + "def driver(x):\n    return stage(Pair(a=x, b=1))\n")
+    assert _kernels_compiled(project, monkeypatch)[0] == 51
+    _edit(project / "pair.py", "a: int\n    b: int", "b: int\n    a: int")
+    assert _kernels_compiled(project, monkeypatch)[0] == 51
 
 
-def test_the_folder_names_the_digest_of_the_sources(tmp_path):
-    assert compile_cache.source_digest() in _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path)).name
+@compiled
+def test_a_file_of_the_cache_that_cannot_be_read_is_made_anew(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    for index in compile_cache.cache_folder().glob("*.nbi"):
+        index.write_bytes(b"not an index")
+    assert _kernels_compiled(project, monkeypatch)[0] == 11
 
 
-def test_bounds_checking_has_a_folder_of_its_own(tmp_path):
-    plain = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path))
-    checked = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path), NUMBA_BOUNDSCHECK="1")
-    assert plain != checked
+def test_bounds_checking_has_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
+    plain = compile_cache.cache_folder()
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    assert compile_cache.cache_folder() != plain
 
 
-def test_a_child_process_with_other_flags_does_not_inherit_the_folder(tmp_path):
-    plain = _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path))
-    inherited = {"NUMBA_CACHE_DIR": str(plain), "TILESTAMP_COMPILE_CACHE": str(plain), "NUMBA_BOUNDSCHECK": "1"}
-    assert _folder_of_new_process(XDG_CACHE_HOME=str(tmp_path), **inherited) != plain
+def test_a_folder_named_by_the_user_is_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert compile_cache.cache_folder().parent == tmp_path
 
 
-def test_a_folder_named_by_the_user_is_left_alone(tmp_path):
-    assert _folder_of_new_process(NUMBA_CACHE_DIR=str(tmp_path)) == tmp_path
-
-
-def test_a_cache_that_cannot_be_written_falls_back_to_temporary_files(tmp_path):
+def test_a_cache_that_cannot_be_written_falls_back_to_temporary_files(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    folder = _folder_of_new_process(XDG_CACHE_HOME=str(blocked), TMPDIR=str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
+    folder = compile_cache.cache_folder()
     assert folder.is_dir()
     assert blocked not in folder.parents
 
 
-def test_a_new_folder_is_cold_until_a_kernel_is_compiled(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert compile_cache.is_cold()
-    (tmp_path / "kernel.nbi").touch()
-    assert not compile_cache.is_cold()
-
-
-def test_old_folders_of_other_sources_are_removed(tmp_path, monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(compile_cache, "_user_cache", lambda: tmp_path)
-    old, recent = tmp_path / "tilestamp" / "old", tmp_path / "tilestamp" / "recent"
-    for folder in (old, recent):
-        folder.mkdir(parents=True)
+def test_kernels_that_were_not_loaded_for_long_are_removed(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "first"))
+    folder = tmp_path / "second" / compile_cache.cache_folder().name
+    folder.mkdir(parents=True)
+    for name in ("old.nbi", "old.1.nbc", "recent.nbi", "recent.1.nbc"):
+        (folder / name).touch()
     past = time.time() - 2 * compile_cache.STALE_DAYS * 86400
-    os.utime(old, (past, past))
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    compile_cache.set_up()
-    assert not old.exists()
-    assert recent.exists()
+    os.utime(folder / "old.nbi", (past, past))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "second"))
+    compile_cache.cache_folder()
+    assert {path.name for path in Path(folder).glob("*.nb*")} == {"recent.nbi", "recent.1.nbc"}

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numba import get_num_threads, set_num_threads
 
-from models.machine import load_machine
-from simulator import simulate
-from simulator.pipelines import load_pipeline, pipeline_names, pipeline_options
-from simulator.run import Run
-from simulator.work import Work
+from tilestamp import simulate
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_names, pipeline_options
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.work import Work
 
 WIDTH, HEIGHT = 96, 72
 COUNTING = [name for name in pipeline_names() if "counting" in pipeline_options(name)]
@@ -108,7 +108,7 @@ def test_the_number_of_threads_changes_nothing(pipeline):
 def test_a_machine_of_twice_the_clock_halves_a_launch_that_is_bound_by_issue():
     slow = simulate("teapot", "micropolygon", "gtx280", width=320, height=240)
     raster = slow.stages.loc["tile_raster"]
-    from models.machine import altered
+    from tilestamp.models.machine import altered
 
     machine = load_machine("gtx280")
     fast = slow.on(altered(machine, {"sm.clock_mhz": 2 * machine.sm.clock_mhz}, "assumed", "a test"))

@@ -5,14 +5,14 @@ import csv
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.pipelines import cudaraster as module
-from simulator.pipelines.cudaraster import cudaraster
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
-from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tests import naive_cudaraster as naive
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.pipelines import cudaraster as module
+from tilestamp.simulator.pipelines.cudaraster import cudaraster
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 
 EYE = np.eye(4)
 STAGES = ["triangle_setup", "bin_raster", "coarse_raster", "fine_raster"]
@@ -125,7 +125,7 @@ def test_a_first_frame_executes_the_stages_of_attempts_that_fail(monkeypatch):
 
 def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
-    monkeypatch.setattr("simulator.sampler.SMALLEST", 1)
+    monkeypatch.setattr("tilestamp.simulator.sampler.SMALLEST", 1)
     run = simulate(
         soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5, first_frame=True
     )

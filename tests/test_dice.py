@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import Coalescing, Simt
-from simulator.scenes import LookAt, load_scene
-from simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
-from simulator.stages.eisenacher2010.dice import dice
-from simulator.stages.eisenacher2010.dice_counts import DiceEvent
 from tests import naive_patches
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.scenes import LookAt, load_scene
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)
 VIEW = LookAt((1.0, -5.0, 2.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 40.0, 0.1, 50.0)

@@ -5,10 +5,10 @@ from functools import cache
 
 import pytest
 
-from experiments.eisenacher2010 import claims, figure4, frames, table1, table2, table3
-from experiments.result import Result
-from simulator import load_scene
-from simulator.run import Run
+from tilestamp import load_scene
+from tilestamp.experiments.eisenacher2010 import claims, figure4, frames, table1, table2, table3
+from tilestamp.experiments.result import Result
+from tilestamp.simulator.run import Run
 
 EXPERIMENTS = (claims, figure4, table1, table2, table3)
 NOTE = "the teapot, because the tests are small"

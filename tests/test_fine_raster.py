@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.stages.laine2011.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
-from simulator.stages.laine2011.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
-from simulator.stages.laine2011.fine_raster_shade import blend_over
-from simulator.stages.laine2011.subtriangle import DEPTH_MAX
-from simulator.stages.laine2011.triangle_setup import triangle_setup
 from tests import naive_cudaraster as naive
 from tests.tile_lists import box_lists
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.laine2011.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
+from tilestamp.simulator.stages.laine2011.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over
+from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 
 E = FineRasterEvent
 MODES = {"depth": (True, True), "blend": (False, True), "depth-only": (True, False), "color": (False, False)}

@@ -5,14 +5,14 @@ import csv
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.pipelines.freepipe import freepipe as pipeline
-from simulator.scenes.scene import Mesh, Scene
-from simulator.stages.liu2010.freepipe import freepipe
-from simulator.stages.liu2010.freepipe_events import FreePipeEvent
-from simulator.stages.liu2010.freepipe_triangle import make_pieces
 from tests.naive_bins import covers
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.pipelines.freepipe import freepipe as pipeline
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.stages.liu2010.freepipe import freepipe
+from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import make_pieces
 
 E = FreePipeEvent
 SCENES = [("bunny", 512), ("bunny", 1024), ("dragon100k", 512), ("teapot16k", 1024), ("nearclip5k", 1024),

@@ -4,15 +4,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.frontier.methods_notes import notes
-from experiments.frontier.methods_scenes import lattice, sheets
-from experiments.frontier.methods_truth import shown_offset
-from experiments.frontier.methods_variants import ALL_TRIANGLES, Variant
-from experiments.frontier.picture_error import depth_errors, flip, pixel_errors
-from simulator import simulate
-from simulator.reference.coverage import Visible, exact_visibility, homogeneous_corners, screen_corners, visibility
-from simulator.stages.depth_format import DEPTHS
-from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from tilestamp import simulate
+from tilestamp.experiments.frontier.methods_notes import notes
+from tilestamp.experiments.frontier.methods_scenes import lattice, sheets
+from tilestamp.experiments.frontier.methods_truth import shown_offset
+from tilestamp.experiments.frontier.methods_variants import ALL_TRIANGLES, Variant
+from tilestamp.experiments.frontier.picture_error import depth_errors, flip, pixel_errors
+from tilestamp.simulator.reference.coverage import (
+    Visible,
+    exact_visibility,
+    homogeneous_corners,
+    screen_corners,
+    visibility,
+)
+from tilestamp.simulator.stages.depth_format import DEPTHS
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
 
 WIDTH, HEIGHT = 48, 32
 SHEETS = sheets(20.0, WIDTH, HEIGHT)

@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.frontier import model
-from experiments.frontier.model_frames import Timed
-from experiments.frontier.model_notes import AUTO, BOUNDS, FULL
-from experiments.frontier.pareto import pareto_front
-from models.auto import ERROR
-from reports.frontier_plot import frontier
-from simulator.scenes import load_scene
+from tilestamp.experiments.frontier import model
+from tilestamp.experiments.frontier.model_frames import Timed
+from tilestamp.experiments.frontier.model_notes import AUTO, BOUNDS, FULL
+from tilestamp.experiments.frontier.pareto import pareto_front
+from tilestamp.models.auto import ERROR
+from tilestamp.reports.frontier_plot import frontier
+from tilestamp.simulator.scenes import load_scene
 
 SIZE = {"width": 96, "height": 72, "tile": 8}
 

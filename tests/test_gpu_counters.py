@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.validation.measuring_memory import unit_bytes
-from experiments.validation.profiler import EFFICIENCY, INSTRUCTIONS, LANES, counters, read_counters
+from tilestamp.experiments.validation.measuring_memory import unit_bytes
+from tilestamp.experiments.validation.profiler import EFFICIENCY, INSTRUCTIONS, LANES, counters, read_counters
 
 CSV = f"""==PROF== Connected to process 7
 "ID","Kernel Name","{LANES}","{INSTRUCTIONS}"

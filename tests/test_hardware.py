@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.machine import load_machine
-from models.price import price
-from models.simt import Simt
-from simulator.pipelines.hardware import hardware as pipeline
-from simulator.scenes.scene import Mesh, Scene
-from simulator.stages.hardware import hardware, hardware_grids
 from tests.test_freepipe import LARGE, TINY, flat
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.models.price import price
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.pipelines.hardware import hardware as pipeline
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.stages.hardware import hardware, hardware_grids
 
 
 @pytest.mark.parametrize("name", ["bunny", "nearclip5k", "edges_512"])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from reports.heatmap import extent
-from simulator.simulation import simulate
+from tilestamp.reports.heatmap import extent
+from tilestamp.simulator.simulation import simulate
 
 WIDTH, HEIGHT = 100, 75  # 4 and 3 pixels over whole tiles
 

@@ -8,13 +8,13 @@ import sys
 
 import pytest
 
-from experiments.jobs import run_experiments
-from experiments.result import Result
+from tilestamp.experiments.jobs import run_experiments
+from tilestamp.experiments.result import Result
 
 
 def test_one_job_runs_in_this_process(monkeypatch, tmp_path):
     here = str(os.getpid())
-    monkeypatch.setattr("experiments.jobs.load_experiment", lambda name: lambda _: Result(name, here, "", []))
+    monkeypatch.setattr("tilestamp.experiments.jobs.load_experiment", lambda name: lambda _: Result(name, here, "", []))
     results = run_experiments(["a/x", "b/y"], tmp_path, {}, lambda _: None, 1)
     assert [result.name for result in results] == ["a/x", "b/y"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-x", "b-y"]
@@ -30,7 +30,7 @@ def test_an_error_in_another_process_reaches_the_caller_and_leaves_no_process(tm
 
 COMMAND = """
 import signal
-from experiments.command_line import main
+from tilestamp.experiments.command_line import main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job begins by ignoring it
 main()
 """

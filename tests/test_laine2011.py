@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from experiments.laine2011 import figure5, figure6, generated, memory, slides, sweep, table3
-from experiments.published import published
-from models.errors import TilestampError
-from models.machine import load_machine
-from simulator.mix import load_mix
-from simulator.scenes import Scene
-from simulator.simulation import simulate
+from tilestamp.experiments.laine2011 import figure5, figure6, generated, memory, slides, sweep, table3
+from tilestamp.experiments.published import published
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.scenes import Scene
+from tilestamp.simulator.simulation import simulate
 
 GENERATED = generated.Statistics("small", 4000, 40.0, 12.0, assumed=False)
 QUAD = Scene.from_clip_space(

@@ -5,12 +5,12 @@ import csv
 import numpy as np
 import pytest
 
-from models.atomics import add_requests
-from models.bounds import bounds
-from models.events import EVENTS, MachineEvent
-from models.launch import Launch
-from models.machine import load_machine
-from models.traffic import Traffic
+from tilestamp.models.atomics import add_requests
+from tilestamp.models.bounds import bounds
+from tilestamp.models.events import EVENTS, MachineEvent
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import load_machine
+from tilestamp.models.traffic import Traffic
 
 H200 = load_machine("h200")
 WARPS = 2048

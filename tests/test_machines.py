@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from models.errors import TilestampError
-from models.machine import FOLDER, altered, list_machines, load_machine
-from models.simt import AtomicMerge, Coalescing
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import FOLDER, altered, list_machines, load_machine
+from tilestamp.models.simt import AtomicMerge, Coalescing
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import importlib.util
 
 import pytest
 
-from experiments.command_line import run_command
-from experiments.validation.machine_file import busy, machine_file
-from experiments.validation.measuring import Number
-from models.machine import load_machine
+from tilestamp.experiments.command_line import run_command
+from tilestamp.experiments.validation.machine_file import busy, machine_file
+from tilestamp.experiments.validation.measuring import Number
+from tilestamp.models.machine import load_machine
 
 H200 = load_machine("h200")
 NUMBERS = [

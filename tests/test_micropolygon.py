@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.pipelines.micropolygon import micropolygon
-from simulator.scenes import Scene, load_scene, read_camera
-from simulator.simulation import simulate
-from simulator.stages.eisenacher2010.bucket_count import BucketCountEvent
-from simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.pipelines.micropolygon import micropolygon
+from tilestamp.simulator.scenes import Scene, load_scene, read_camera
+from tilestamp.simulator.simulation import simulate
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketCountEvent
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import BucketWriteEvent
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 WIDTH, HEIGHT = 160, 120

@@ -5,11 +5,11 @@ from enum import IntEnum
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.events import MachineEvent
-from simulator import simulate
-from simulator.mix import MIXES, PROVENANCES, KernelMix, load_mix
-from simulator.work import Work
+from tilestamp import simulate
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.events import MachineEvent
+from tilestamp.simulator.mix import MIXES, PROVENANCES, KernelMix, load_mix
+from tilestamp.simulator.work import Work
 
 pytestmark = pytest.mark.small
 

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.motion import (
+from tests import naive_ste
+from tests.test_stamps import HEIGHT, WIDTH, soup
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.motion import (
     MotionEvent,
     blur_samples,
     circle_of_confusion,
@@ -13,10 +15,8 @@ from simulator.stages.fatahalian2009.motion import (
     moved,
     stratified_pattern,
 )
-from simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
-from simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
-from tests import naive_ste
-from tests.test_stamps import HEIGHT, WIDTH, soup
+from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
 
 PATTERNS = {"stratified": stratified_pattern(4, tile=3), "interleaved": interleaved_pattern(2, tile=2)}
 

@@ -5,8 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.nvdiffrast import rasterize
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.nvdiffrast import rasterize
 
 TRIANGLE = np.array([[[-1, -1, 0, 1], [1, -1, 0.5, 1], [-1, 1, -0.5, 1]]], np.float32)
 TRI = np.array([[0, 1, 2]], np.int32)

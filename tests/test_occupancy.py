@@ -2,9 +2,9 @@
 
 import pytest
 
-from models.errors import TilestampError
-from models.machine import altered, load_machine
-from models.occupancy import residency
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.occupancy import residency
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.parallel import for_parts, parts_of
 
 pytestmark = pytest.mark.small
 

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from models.errors import TilestampError
-from simulator.reference.coverage import (
+from tests import naive_coverage as naive
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.reference.coverage import (
     Grid,
     exact_coverage,
     exact_visibility,
@@ -18,9 +19,8 @@ from simulator.reference.coverage import (
     screen_corners,
     visibility,
 )
-from simulator.reference.orientation import COMPONENTS, edge_function, edge_sign, sure_sign, two_product
-from simulator.reference.picture import exact_picture
-from tests import naive_coverage as naive
+from tilestamp.simulator.reference.orientation import COMPONENTS, edge_function, edge_sign, sure_sign, two_product
+from tilestamp.simulator.reference.picture import exact_picture
 
 SCRATCH = np.empty(COMPONENTS)
 reals = st.floats(-1e6, 1e6, allow_subnormal=False).map(lambda v: float(np.float32(v)))

@@ -5,11 +5,11 @@ import json
 import pandas as pd
 import pytest
 
-from experiments.registry import describe, experiment_names, is_slow, select
-from experiments.result import Cell, Result
-from experiments.stability.boundary import Boundary, atlas_result
-from experiments.write import cell_texts, write_index, write_result
-from models.errors import TilestampError
+from tilestamp.experiments.registry import describe, experiment_names, is_slow, select
+from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result
+from tilestamp.experiments.write import cell_texts, write_index, write_result
+from tilestamp.models.errors import TilestampError
 
 
 def cell(published: float | str | None = 10.0, ours: float | str = 11.0, status: str = "predicted") -> Cell:

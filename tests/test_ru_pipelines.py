@@ -5,24 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.machine import load_machine
-from models.occupancy import residency
-from models.simt import Simt
-from simulator.mix import load_mix
-from simulator.pipelines.per_primitive import per_primitive
-from simulator.pipelines.tiled import tiled
-from simulator.scenes.camera import LookAt
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.textured_mesh import draws, geometry
-from simulator.simulation import simulate
-from simulator.stages.ru2016.fragment_shading import interpolate
-from simulator.stages.ru2016.tile_lists import tile_lists
-from simulator.stages.ru2016.tile_lists_fill import overlaps
-from simulator.stages.ru2016.tiled_raster import Visible
-from simulator.stages.ru2016.vertex_shading import vertex_shading
 from tests import naive_textured as naive
 from tests.textured_soup import soup
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.models.occupancy import residency
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.pipelines.per_primitive import per_primitive
+from tilestamp.simulator.pipelines.tiled import tiled
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.textured_mesh import draws, geometry
+from tilestamp.simulator.simulation import simulate
+from tilestamp.simulator.stages.ru2016.fragment_shading import interpolate
+from tilestamp.simulator.stages.ru2016.tile_lists import tile_lists
+from tilestamp.simulator.stages.ru2016.tile_lists_fill import overlaps
+from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
+from tilestamp.simulator.stages.ru2016.vertex_shading import vertex_shading
 
 WIDTH, HEIGHT = 61, 47  # no multiples of a tile
 SIMT = Simt(coalescing=2, atomic_merge=0, sms=2)

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator import simulate
-from simulator.estimate import Estimate, t_quantile
-from simulator.run import Run
-from simulator.sampler import Sampler
-from simulator.sampling import enlarged, expanded, totals
-from simulator.strata import Sample, drawn, make_strata, pilot
-from simulator.work import Work
+from tilestamp import simulate
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.estimate import Estimate, t_quantile
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling import enlarged, expanded, totals
+from tilestamp.simulator.strata import Sample, drawn, make_strata, pilot
+from tilestamp.simulator.work import Work
 
 SEEDS = 200
 ERROR = 0.02
@@ -23,7 +23,7 @@ MICRO = {"width": 320, "height": 240, "bound": 3}
 @pytest.fixture
 def small_frames(monkeypatch):
     """Sample frames that are too small to be worth it."""
-    monkeypatch.setattr("simulator.sampler.SMALLEST", 1)
+    monkeypatch.setattr("tilestamp.simulator.sampler.SMALLEST", 1)
 
 
 def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:

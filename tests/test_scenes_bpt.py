@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.scenes.bpt import read_bpt
-from simulator.scenes.library import DATA
-from simulator.scenes.scene import Patches
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.bpt import read_bpt
+from tilestamp.simulator.scenes.library import DATA
+from tilestamp.simulator.scenes.scene import Patches
 
 NUMBERS = ",".join(map(str, range(1, 17)))
 POINTS = [f"{i},{2 * i},{3 * i}" for i in range(16)]

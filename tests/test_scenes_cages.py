@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.scenes.approximate_catmull_clark import patches_from_cage
-from simulator.scenes.library import DATA
-from simulator.scenes.quad_cage import Cage, read_cage, refine
 from tests import naive_scenes
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
+from tilestamp.simulator.scenes.library import DATA
+from tilestamp.simulator.scenes.quad_cage import Cage, read_cage, refine
 
 CUBE = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.scenes import LookAt, ModelToClip, Scene, read_camera
-from simulator.scenes.camera import fit_camera
-from simulator.scenes.scene import Patches
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes import LookAt, ModelToClip, Scene, read_camera
+from tilestamp.simulator.scenes.camera import fit_camera
+from tilestamp.simulator.scenes.scene import Patches
 
 
 def project(camera, point, width=400, height=300):

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from models.errors import TilestampError
-from simulator.scenes import Scene, list_scenes, load_scene
-from simulator.scenes.library import bounds, scene_or_stand_in, stand_in
-from simulator.scenes.search_path import SCENES_VARIABLE, find_scene
-from simulator.scenes.subpatches import split_to_count, tessellate, with_mesh
 from tests import naive_scenes
 from tests.test_scenes_bpt import write as write_bpt
 from tests.test_scenes_meshes import SQUARE
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes import Scene, list_scenes, load_scene
+from tilestamp.simulator.scenes.library import bounds, scene_or_stand_in, stand_in
+from tilestamp.simulator.scenes.search_path import SCENES_VARIABLE, find_scene
+from tilestamp.simulator.scenes.subpatches import split_to_count, tessellate, with_mesh
 
 
 @pytest.fixture
@@ -243,7 +243,8 @@ def test_bounds_are_those_of_the_used_vertices(tmp_path):
 
 
 def test_importing_scenes_brings_in_nothing_slow():
-    code = "import sys, simulator.scenes; print([m for m in ('pandas', 'trimesh', 'matplotlib') if m in sys.modules])"
+    slow = "[m for m in ('pandas', 'trimesh', 'matplotlib') if m in sys.modules]"
+    code = f"import sys, tilestamp.simulator.scenes; print({slow})"
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603 - our own interpreter and code
     assert done.stdout == "[]\n"
@@ -262,7 +263,7 @@ def test_a_patch_in_three_parts_covers_the_whole():
 
 def test_the_measured_cameras_were_made_for_the_embedded_teapot(shared):
     """In the fourth queue pass of the 1600x1200 frame exactly two sub-patches are under 4 pixels."""
-    from simulator.scenes import read_camera
+    from tilestamp.simulator.scenes import read_camera
 
     camera = read_camera(f"{shared / 'silicon' / 'micropolygon_cameras.json'}:teapot_1600x1200_bb4")
     nets = split_to_count(load_scene("teapot").patches, 2048).points.astype(np.float64)

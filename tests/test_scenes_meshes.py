@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from models.errors import TilestampError
-from simulator.scenes import Scene, load_scene
-from simulator.scenes.clip_space import read_clip_space
-from simulator.scenes.obj_file import read_obj
-from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes import Scene, load_scene
+from tilestamp.simulator.scenes.clip_space import read_clip_space
+from tilestamp.simulator.scenes.obj_file import read_obj
+from tilestamp.simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

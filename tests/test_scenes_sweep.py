@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from simulator.scenes import Scene
-from simulator.scenes.sweep import Layout, layout, sweep_mesh
-from simulator.scenes.xorshift import AUTHORS_SEED, draw_floats, draw_words, random_state
 from tests import naive_scenes
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes import Scene
+from tilestamp.simulator.scenes.sweep import Layout, layout, sweep_mesh
+from tilestamp.simulator.scenes.xorshift import AUTHORS_SEED, draw_floats, draw_words, random_state
 
 COUNTS = [  # area in pixels, layers, step, triangles: the notes on the benchmark, section 9.1
     (0, 16, 28, 1023768),

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models import schedule as module
-from models.bounds import bounds
-from models.events import EVENTS, MachineEvent
-from models.launch import Launch
-from models.machine import altered, load_machine
-from models.schedule import schedule
-from models.traffic import Traffic
+from tilestamp.models import schedule as module
+from tilestamp.models.bounds import bounds
+from tilestamp.models.events import EVENTS, MachineEvent
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.schedule import schedule
+from tilestamp.models.traffic import Traffic
 
 GTX280 = altered(
     load_machine("gtx280"),

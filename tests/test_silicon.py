@@ -3,23 +3,23 @@
 import numpy as np
 import pytest
 
-from experiments.silicon.cudaraster_blocks import CHAINS, LANES, RUNS, Run
-from experiments.silicon.cudaraster_mix import FITTED, chain, instructions
-from experiments.silicon.h200 import status
-from experiments.silicon.leave_one_out import _refit
-from experiments.silicon.mix_from_sass import RASTER, main
-from experiments.silicon.raster_sections import raster_sections
-from experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
-from models.events import EVENTS
-from models.launch import Launch, Stream
-from models.machine import load_machine
-from models.traffic import traffic
-from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
-from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
-from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
-from simulator.stages.laine2011.parameter_copy import with_parameter_copy
-from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
-from simulator.work import Work
+from tilestamp.experiments.silicon.cudaraster_blocks import CHAINS, LANES, RUNS, Run
+from tilestamp.experiments.silicon.cudaraster_mix import FITTED, chain, instructions
+from tilestamp.experiments.silicon.h200 import status
+from tilestamp.experiments.silicon.leave_one_out import _refit
+from tilestamp.experiments.silicon.mix_from_sass import RASTER, main
+from tilestamp.experiments.silicon.raster_sections import raster_sections
+from tilestamp.experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
+from tilestamp.models.events import EVENTS
+from tilestamp.models.launch import Launch, Stream
+from tilestamp.models.machine import load_machine
+from tilestamp.models.traffic import traffic
+from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from tilestamp.simulator.stages.laine2011.parameter_copy import with_parameter_copy
+from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
+from tilestamp.simulator.work import Work
 
 LISTING = "silicon/src/micropolygon_sm90.sass.xz"
 
@@ -61,7 +61,7 @@ def test_each_sub_tile_has_its_own_copy_of_the_sampling_code(functions, tile, sp
 
 @pytest.mark.shared
 def test_the_mix_in_the_package_is_what_the_machine_code_says(shared):
-    from simulator.mix import MIXES
+    from tilestamp.simulator.mix import MIXES
 
     assert main(shared / LISTING) in (MIXES / "micropolygon" / "cc9.toml").read_text()
 

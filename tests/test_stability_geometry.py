@@ -2,7 +2,16 @@
 
 import pytest
 
-from experiments.stability import clipping, depth_twice, far_away, grazing, methods, shared_edges, slivers, z_fighting
+from tilestamp.experiments.stability import (
+    clipping,
+    depth_twice,
+    far_away,
+    grazing,
+    methods,
+    shared_edges,
+    slivers,
+    z_fighting,
+)
 
 
 @pytest.mark.parametrize(

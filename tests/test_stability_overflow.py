@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.stability import (
+from tilestamp.experiments.stability import (
     collapsed_edges,
     cracks,
     displacement,
@@ -19,11 +19,11 @@ from experiments.stability import (
     retries,
     tile_lists,
 )
-from experiments.stability.patch_frames import split
-from models.errors import TilestampError
-from models.machine import load_machine
-from simulator.stages.eisenacher2010.snap_edges import shared_edges, snap_edges
-from simulator.stages.zhang2025.primitive_compaction import most_triangles
+from tilestamp.experiments.stability.patch_frames import split
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import shared_edges, snap_edges
+from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
 BOUND = 16.0  # pixels: sheets have three depths
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
-from simulator.stages.fatahalian2009.stamps import CHUNK, StampsEvent, stamp_shape, stamps
-from simulator.stages.fatahalian2009.stamps_count import count_tests
 from tests import naive_ste
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import CHUNK, StampsEvent, stamp_shape, stamps
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 WIDTH, HEIGHT = 13, 9
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from experiments.ste import algorithms, aspect, blur, closed_form, eisenacher
-from experiments.ste.setting import cube, mean_area, random_polygons, student
-from models.simt import Simt
-from simulator.pipelines import load_pipeline, pipeline_options
-from simulator.scenes import load_scene, read_camera
+from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eisenacher
+from tilestamp.experiments.ste.setting import cube, mean_area, random_polygons, student
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
+from tilestamp.simulator.scenes import load_scene, read_camera
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from simulator.scenes.texture import (
+from tests import naive_textured as naive
+from tilestamp.simulator.scenes.texture import (
     TILE,
     add_bilinear,
     add_trilinear,
@@ -12,7 +13,6 @@ from simulator.scenes.texture import (
     texel_index,
     texture_chains,
 )
-from tests import naive_textured as naive
 
 POINTS = [(0.0, 0.0), (0.31, 0.77), (0.999, 0.001), (1.0, 1.0), (-0.3, 2.6), (5.5, -7.25)]
 

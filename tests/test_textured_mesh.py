@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from models.errors import TilestampError
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.textured_mesh import geometry, read_gltf
-from simulator.scenes.textured_obj import read_textured_obj
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.textured_mesh import geometry, read_gltf
+from tilestamp.simulator.scenes.textured_obj import read_textured_obj
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 

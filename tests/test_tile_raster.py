@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from numba import get_num_threads, set_num_threads
 
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write
-from simulator.stages.eisenacher2010.tile_range import screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as Event
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_raster
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as Event
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 H200 = Simt()

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.stages.laine2011.exact import (
+from tests import naive_cudaraster as naive
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.laine2011.exact import (
     fma,
     lowest_bit,
     popcount,
@@ -18,9 +19,8 @@ from simulator.stages.laine2011.exact import (
     round_to_uint32,
     truncate_to_uint32,
 )
-from simulator.stages.laine2011.triangle_setup import BLOCK, triangle_setup
-from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
-from tests import naive_cudaraster as naive
+from tilestamp.simulator.stages.laine2011.triangle_setup import BLOCK, triangle_setup
+from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
 
 E = TriangleSetupEvent
 floats = st.floats(width=32, min_value=-1e6, max_value=1e6).map(np.float32)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from experiments.silicon import unseen_scenes
-from experiments.silicon.unseen import MEASURED
-from experiments.silicon.unseen_scenes import DIGESTS, SOUPS, digest_of, write_inputs
-from experiments.validation.stored import CUDARASTER, FREEPIPE, read
-from models.errors import TilestampError
+from tilestamp.experiments.silicon import unseen_scenes
+from tilestamp.experiments.silicon.unseen import MEASURED
+from tilestamp.experiments.silicon.unseen_scenes import DIGESTS, SOUPS, digest_of, write_inputs
+from tilestamp.experiments.validation.stored import CUDARASTER, FREEPIPE, read
+from tilestamp.models.errors import TilestampError
 
 
 def test_the_soups_are_those_that_were_drawn():

@@ -4,12 +4,12 @@ import csv
 
 import pytest
 
-from experiments.command_line import run_command
-from experiments.validation.back_end import back_end, cameras, grids_of
-from experiments.validation.quantities import QUANTITIES
-from experiments.validation.shuffle import SEED, mersenne_twister_64, shuffled
-from models.machine import load_machine
-from simulator.mix import load_mix
+from tilestamp.experiments.command_line import run_command
+from tilestamp.experiments.validation.back_end import back_end, cameras, grids_of
+from tilestamp.experiments.validation.quantities import QUANTITIES
+from tilestamp.experiments.validation.shuffle import SEED, mersenne_twister_64, shuffled
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.mix import load_mix
 
 SCENE = "teapot_512x512_bb8"
 

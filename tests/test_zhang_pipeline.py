@@ -5,27 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.errors import TilestampError
-from models.launch_graph import Node, as_graph, on_stream
-from models.machine import altered, load_machine
-from models.price import price
-from models.simt import Simt
-from simulator import simulate
-from simulator.mix import load_mix
-from simulator.pipelines.binned import binned
-from simulator.scenes.camera import LookAt
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.textured_mesh import geometry
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.stages.zhang2025.depth import DEPTH_STEPS
-from simulator.stages.zhang2025.fine_tile import quad_mask
-from simulator.stages.zhang2025.pixel_shader_block import quad_coordinates
-from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
-from simulator.stages.zhang2025.primitive_compaction import most_triangles, primitive_compaction
-from simulator.stages.zhang2025.triangle_setup import triangle_setup
-from simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 from tests import naive_textured as naive
 from tests.textured_soup import soup
+from tilestamp import simulate
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch_graph import Node, as_graph, on_stream
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.price import price
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.pipelines.binned import binned
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.textured_mesh import geometry
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS
+from tilestamp.simulator.stages.zhang2025.fine_tile import quad_mask
+from tilestamp.simulator.stages.zhang2025.pixel_shader_block import quad_coordinates
+from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
+from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles, primitive_compaction
+from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
+from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 
 WIDTH, HEIGHT = 141, 131  # two bins each way, no multiples of a tile
 SIMT = Simt()

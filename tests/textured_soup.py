@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.scene import Mesh, Scene
 
 
 def soup(seed=3, count=40):

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from experiments.registry import describe, experiment_names, is_slow
-from models.machine import list_machines
-from simulator.pipelines import load_pipeline, pipeline_names
-from simulator.scenes import list_scenes
+from tilestamp.experiments.registry import describe, experiment_names, is_slow
+from tilestamp.models.machine import list_machines
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_names
+from tilestamp.simulator.scenes import list_scenes
 
 Kind = Literal["scenes", "pipelines", "machines", "experiments"]
 

@@ -6,9 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from experiments.commands.terminal import print_table, progress
-from models.errors import TilestampError
-from models.machine import load_machine
+from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
 
 
 def measure_machine(
@@ -29,9 +29,9 @@ def measure_machine(
         raise TilestampError(f"a machine file ends in .toml, not {output.name}")
     if not output.absolute().parent.is_dir():
         raise TilestampError(f"there is no folder {output.absolute().parent} to write {output.name} to")
-    from experiments.validation.gpu import cupy
-    from experiments.validation.machine_file import busy, machine_file
-    from experiments.validation.measure import measure
+    from tilestamp.experiments.validation.gpu import cupy
+    from tilestamp.experiments.validation.machine_file import busy, machine_file
+    from tilestamp.experiments.validation.measure import measure
 
     cp = cupy()
     properties = cp.cuda.runtime.getDeviceProperties(cp.cuda.Device().id)

@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from experiments.commands.render_output import as_json, print_run, write_map, write_png
-from experiments.commands.terminal import progress
-from models.errors import TilestampError
-from simulator.run import Run
+from tilestamp.experiments.commands.render_output import as_json, print_run, write_map, write_png
+from tilestamp.experiments.commands.terminal import progress
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.run import Run
 
 
 def render(
@@ -124,8 +124,8 @@ def _simulate(
     asked: dict[str, Any],
 ) -> Run:
     """Load the machine with its what-ifs and simulate."""
-    from models.machine import altered, load_machine
-    from simulator.simulation import simulate
+    from tilestamp.models.machine import altered, load_machine
+    from tilestamp.simulator.simulation import simulate
 
     described = load_machine(machine)
     if changes:

@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from experiments.commands.terminal import print_table
-from models.errors import TilestampError
-from simulator.run import Run
+from tilestamp.experiments.commands.terminal import print_table
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.run import Run
 
 SHOWN = {  # column of the terminal table: how to print it
     "blocks": ",.0f",
@@ -42,7 +42,7 @@ def write_png(image: Any, path: Path) -> None:
 
 def write_map(run: Run, name: str, path: Path) -> None:
     """Draw a counter's heat map."""
-    from reports.heatmap import heat_map
+    from tilestamp.reports.heatmap import heat_map
 
     if name not in run.frame.maps:
         raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")

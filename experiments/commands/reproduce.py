@@ -7,12 +7,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from experiments.commands.terminal import print_table, progress
-from experiments.jobs import default_jobs, run_experiments
-from experiments.registry import experiment_names, select
-from experiments.result import Result
-from experiments.write import COLUMNS, cell_texts, write_index
-from models.errors import TilestampError
+from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.jobs import default_jobs, run_experiments
+from tilestamp.experiments.registry import experiment_names, select
+from tilestamp.experiments.result import Result
+from tilestamp.experiments.write import COLUMNS, cell_texts, write_index
+from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
 

@@ -6,28 +6,39 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.table import Table
 
-from models.compile_cache import is_cold
+from tilestamp.models.compile_cache import on_compiling
 
 
 @contextmanager
 def progress(text: str) -> Iterator["Progress"]:
-    """Show what is being done on standard error; say so when kernels are being compiled."""
+    """Show what is being done on standard error, and which kernels are being compiled meanwhile."""
     console = Console(stderr=True)
-    if is_cold():
-        console.print("compiling kernels: only the first time, a minute or two")
     with console.status(text) as status:
-        yield Progress(console, status.update)
+        said = Progress(console, status.update, text)
+        on_compiling(said.compiling)
+        yield said
 
 
 class Progress:
     """Call it with what is being done now."""
 
-    def __init__(self, console: Console, update: object) -> None:
+    def __init__(self, console: Console, update: object, text: str) -> None:
         self._console = console
         self._update = update
+        self._text = text
+        self._compiled = 0
+
+    def compiling(self, kernel: str) -> None:
+        """Say that a kernel is being compiled: each in place on a terminal, elsewhere only the first."""
+        self._compiled += 1
+        if self._console.is_terminal:
+            self._update(f"{self._text}: compiling {kernel}, once (kernel {self._compiled})")  # type: ignore[operator]
+        elif self._compiled == 1:
+            self._console.print("compiling kernels: only the first time, a minute or two")
 
     def __call__(self, text: str) -> None:
         """Say what is being done: in place on a terminal, a line each elsewhere."""
+        self._text = text
         if self._console.is_terminal:
             self._update(text)  # type: ignore[operator]  # rich's Status.update
         else:

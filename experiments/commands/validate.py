@@ -6,10 +6,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from experiments.commands.terminal import print_table, progress
-from experiments.validation.summary import by_kernel, fastest_tiles
-from models.errors import TilestampError
-from models.machine import load_machine
+from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.validation.summary import by_kernel, fastest_tiles
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
 
 
 def validate(
@@ -33,13 +33,13 @@ def validate(
     model = load_machine(machine)
     with progress("validating") as say:
         if measurements is None:
-            from experiments.validation.on_gpu import compare_here
+            from tilestamp.experiments.validation.on_gpu import compare_here
 
             table, remarks = compare_here(model, say)
         else:
             if not measurements.is_dir():
                 raise TilestampError(f"{measurements} is not a folder of measurements")
-            from experiments.validation.stored import compare
+            from tilestamp.experiments.validation.stored import compare
 
             table, remarks = compare(measurements, model, say), []
     if output is not None:

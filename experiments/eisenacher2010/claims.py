@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stage_ms, stand_in_warnings
-from experiments.registry import Progress
-from experiments.result import Cell, Result
+from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stage_ms, stand_in_warnings
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Result
 
 if TYPE_CHECKING:
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 BOX_TEST_SAVING = 0.30  # of total time
 THEORETICAL_STE = 0.02  # quoted after Fatahalian et al. 2009, not measured

@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from reports.plots import lines
+from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:
     from pathlib import Path

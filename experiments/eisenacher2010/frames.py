@@ -2,10 +2,10 @@
 
 from functools import cache
 
-from simulator.run import Run
-from simulator.scenes.library import scene_or_stand_in
-from simulator.scenes.scene import Scene
-from simulator.simulation import simulate
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.library import scene_or_stand_in
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.simulation import simulate
 
 SOURCE = "Eisenacher & Loop, Data-parallel Micropolygon Rasterization, Eurographics 2010 short papers"
 MACHINE = "gtx280"

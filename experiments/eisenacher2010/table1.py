@@ -3,19 +3,19 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from experiments.eisenacher2010.frames import SOURCE, frame, stage_ms, stand_in_warnings
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.plots import lines
-from simulator.work import Work
+from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, stage_ms, stand_in_warnings
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.work import Work
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 SUBPATCHES = 270_000  # as printed
 FITTED_TILES = (4, 32)  # the two atomic parameters of gtx280.toml were chosen on these address calculation times

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.plots import paired_bars
+from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -3,17 +3,24 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from experiments.eisenacher2010.frames import OVERHEAD_MS, SOURCE, frame, overhead_ms, stage_ms, stand_in_warnings
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.plots import stacked_bars
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
-from simulator.work import Work
+from tilestamp.experiments.eisenacher2010.frames import (
+    OVERHEAD_MS,
+    SOURCE,
+    frame,
+    overhead_ms,
+    stage_ms,
+    stand_in_warnings,
+)
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.plots import stacked_bars
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
+from tilestamp.simulator.work import Work
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 STAGE_AIM, TOTAL_AIM = 0.20, 0.10
 SPLIT_MS, HYBRID_SPLIT_MS = 7.7 + 1.5, 7.7

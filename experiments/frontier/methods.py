@@ -11,10 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.frontier.methods_notes import TIES, notes
-from experiments.frontier.methods_scenes import AREAS, AREAS_LONG, Subject, lattice, patches, subjects, textured_subject
-from experiments.frontier.methods_truth import QUICK_SIDE, Truth
-from experiments.frontier.methods_variants import (
+from tilestamp.experiments.frontier.methods_notes import TIES, notes
+from tilestamp.experiments.frontier.methods_scenes import (
+    AREAS,
+    AREAS_LONG,
+    Subject,
+    lattice,
+    patches,
+    subjects,
+    textured_subject,
+)
+from tilestamp.experiments.frontier.methods_truth import QUICK_SIDE, Truth
+from tilestamp.experiments.frontier.methods_variants import (
     ALL_PATCHES,
     ALL_TRIANGLES,
     FILTERED,
@@ -22,16 +30,16 @@ from experiments.frontier.methods_variants import (
     QUICK_TRIANGLES,
     Variant,
 )
-from experiments.frontier.model_frames import is_long
-from experiments.frontier.pareto import pareto_front
-from experiments.frontier.picture_error import depth_errors, pixel_errors
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from models.errors import TilestampError
-from reports.methods_plot import panels, side_by_side
-from simulator.reference.picture import SIDE
-from simulator.run import Run
-from simulator.simulation import simulate
+from tilestamp.experiments.frontier.model_frames import is_long
+from tilestamp.experiments.frontier.pareto import pareto_front
+from tilestamp.experiments.frontier.picture_error import depth_errors, pixel_errors
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.errors import TilestampError
+from tilestamp.reports.methods_plot import panels, side_by_side
+from tilestamp.simulator.reference.picture import SIDE
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd

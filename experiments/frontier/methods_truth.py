@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.frontier.methods_scenes import Subject
-from experiments.frontier.methods_variants import Variant
-from experiments.frontier.picture_error import flip
-from models.machine import load_machine
-from simulator.pipelines._cudaraster_image import shown_sample
-from simulator.reference.coverage import CENTRE, Visible, homogeneous_corners, screen_corners, visibility
-from simulator.reference.picture import exact_picture
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.dice import dice
-from simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND
-from simulator.stages.fatahalian2009.micropolygons import micropolygons
-from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
-from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from tilestamp.experiments.frontier.methods_scenes import Subject
+from tilestamp.experiments.frontier.methods_variants import Variant
+from tilestamp.experiments.frontier.picture_error import flip
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.pipelines._cudaraster_image import shown_sample
+from tilestamp.simulator.reference.coverage import CENTRE, Visible, homogeneous_corners, screen_corners, visibility
+from tilestamp.simulator.reference.picture import exact_picture
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
 
 MICROPOLYGONS = ("stamps", "across-polygons", "bit-mask")  # white behind, a grey a polygon
 FINE_BOUND = 2.0  # pixels of a sub-patch of the reference: its micropolygons are two thirds of a pixel

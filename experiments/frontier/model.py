@@ -9,17 +9,17 @@ from dataclasses import asdict, dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
-from experiments.frontier.model_frames import Timed, frames, is_long, warnings
-from experiments.frontier.model_notes import AUTO, BOUNDS, COUNTS, FULL, notes
-from experiments.frontier.pareto import pareto_front
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from models.events import INSTRUCTION_CLASSES
-from models.launch import Launch
-from models.price import Fidelity
-from reports.frontier_plot import frontier
-from simulator.run import Run
+from tilestamp.experiments.frontier.model_frames import Timed, frames, is_long, warnings
+from tilestamp.experiments.frontier.model_notes import AUTO, BOUNDS, COUNTS, FULL, notes
+from tilestamp.experiments.frontier.pareto import pareto_front
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.launch import Launch
+from tilestamp.models.price import Fidelity
+from tilestamp.reports.frontier_plot import frontier
+from tilestamp.simulator.run import Run
 
 if TYPE_CHECKING:
     from pathlib import Path

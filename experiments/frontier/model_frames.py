@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.eisenacher2010.frames import model, overhead_ms, stand_in_warnings
-from experiments.laine2011 import sweep
-from experiments.published import published
-from experiments.silicon.h200 import folder
-from models.errors import TilestampError
-from simulator.run import Run
-from simulator.scenes import Scene, load_scene
-from simulator.simulation import simulate
+from tilestamp.experiments.eisenacher2010.frames import model, overhead_ms, stand_in_warnings
+from tilestamp.experiments.laine2011 import sweep
+from tilestamp.experiments.published import published
+from tilestamp.experiments.silicon.h200 import folder
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes import Scene, load_scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +41,7 @@ class Timed:
     ----------
     name : str
     scene, pipeline, machine, arguments
-        Of ``simulator.simulate``.
+        Of ``tilestamp.simulator.simulate``.
     milliseconds_of : callable
         What is compared, of a run.
     known_ms : float

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from models.auto import ERROR
+from tilestamp.models.auto import ERROR
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.reference.coverage import Visible
-from simulator.stages.depth_format import DEPTHS
-from simulator.stages.zhang2025.depth import DEPTH_STEPS
+from tilestamp.simulator.reference.coverage import Visible
+from tilestamp.simulator.stages.depth_format import DEPTHS
+from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS
 
 CLEARLY_BEHIND = 1e-3  # of the depth range from -1 to 1: far more than any depth format here cannot tell apart
 CUDARASTER = (2147483648.0, 2147465984.0)  # depth of z / w = 0, and how far 1 lies from it (triangle setup)

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from models.errors import TilestampError
-from reports.sampling_plot import sampling_plot
-from simulator.run import Run
-from simulator.sampler import SMALLEST
-from simulator.scenes.library import load_scene, with_views
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.errors import TilestampError
+from tilestamp.reports.sampling_plot import sampling_plot
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.sampler import SMALLEST
+from tilestamp.simulator.scenes.library import load_scene, with_views
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.laine2011.sweep import (
+from tilestamp.experiments.laine2011.sweep import (
     FITTED_AREAS,
     PUBLISHED_AREAS,
     SOURCE,
@@ -16,17 +16,17 @@ from experiments.laine2011.sweep import (
     nanoseconds,
     published_ns,
 )
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.fitted_lines import fitted_lines
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.fitted_lines import fitted_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 WORST_AIM, MEDIAN_AIM = 0.25, 0.08
 COUNTER_AIM = 0.005  # the reference is rounded, and says that its last digits may move

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, STAGES, WIDTH
-from experiments.laine2011.table3 import CAMERA, FULL, buddha, load_buddha, reduced_warning
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from reports.plots import lines
-from simulator.scenes import load_scene
-from simulator.scenes.search_path import find_scene
-from simulator.simulation import simulate
+from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, STAGES, WIDTH
+from tilestamp.experiments.laine2011.table3 import CAMERA, FULL, buddha, load_buddha, reduced_warning
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes import load_scene
+from tilestamp.simulator.scenes.search_path import find_scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.published import published
-from models.errors import TilestampError
-from simulator.run import Run
-from simulator.scenes import Scene
-from simulator.simulation import simulate
+from tilestamp.experiments.published import published
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes import Scene
+from tilestamp.simulator.simulation import simulate
 
 MACHINE = "gtx480"
 PIPELINES = ("hardware", "cudaraster", "freepipe")

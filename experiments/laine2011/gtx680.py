@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from reports.plots import lines
+from tilestamp.experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:
     from pathlib import Path

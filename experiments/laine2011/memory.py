@@ -2,13 +2,13 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.laine2011.generated import draw, scenes, statistics, warning
-from experiments.laine2011.sweep import SOURCE
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.plots import paired_bars
-from simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
+from tilestamp.experiments.laine2011.generated import draw, scenes, statistics, warning
+from tilestamp.experiments.laine2011.sweep import SOURCE
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.plots import paired_bars
+from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
 
 if TYPE_CHECKING:
     from pathlib import Path

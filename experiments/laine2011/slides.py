@@ -2,19 +2,19 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.laine2011.generated import PIPELINES, VARIABLE, draw, scenes, sizes, warning
-from experiments.laine2011.sweep import SOURCE
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result
-from reports.plots import paired_bars
+from tilestamp.experiments.laine2011.generated import PIPELINES, VARIABLE, draw, scenes, sizes, warning
+from tilestamp.experiments.laine2011.sweep import SOURCE
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from experiments.laine2011.generated import Statistics
+    from tilestamp.experiments.laine2011.generated import Statistics
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

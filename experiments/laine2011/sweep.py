@@ -5,13 +5,13 @@ from functools import cache
 
 import numpy as np
 
-from experiments.published import published
-from models.errors import TilestampError
-from models.machine import load_machine
-from simulator.frame import Frame
-from simulator.pipelines import load_pipeline
-from simulator.run import Run
-from simulator.scenes import Scene
+from tilestamp.experiments.published import published
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes import Scene
 
 SOURCE = "Laine & Karras, High-Performance Software Rasterization on GPUs, HPG 2011, and the benchmark of release 1.1"
 MACHINE = "gtx480"
@@ -68,7 +68,7 @@ def nanoseconds(run: Run, triangles: int) -> dict[str, float]:
 
 def fitted_entries() -> int:
     """Numbers of the mix that were chosen on the sweep."""
-    from simulator.mix import load_mix
+    from tilestamp.simulator.mix import load_mix
 
     return sum(
         kind == "fitted"

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
-from experiments.published import published
-from experiments.registry import Progress
-from experiments.result import Cell, Figure, Result, Status
-from reports.plots import paired_bars
-from simulator.scenes import Scene, load_scene
-from simulator.scenes.search_path import find_scene
-from simulator.simulation import simulate
+from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
+from tilestamp.experiments.published import published
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.reports.plots import paired_bars
+from tilestamp.simulator.scenes import Scene, load_scene
+from tilestamp.simulator.scenes.search_path import find_scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 FULL, REDUCED = "happy_vrip", "buddha_100k"  # the authors' mesh of 1,087,716 triangles, and a simplified one
 CAMERA = f"{Path(__file__).parent / 'cameras.json'}:buddha:0"

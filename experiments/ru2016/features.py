@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Result
-from experiments.ru2016.setting import MODELS_TILE, SOURCE, draw, missing, published
-from simulator.run import Run
+from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.ru2016.setting import MODELS_TILE, SOURCE, draw, missing, published
+from tilestamp.simulator.run import Run
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

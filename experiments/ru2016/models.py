@@ -5,8 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result, Status
-from experiments.ru2016.setting import (
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.ru2016.setting import (
     DEGREE_VIEW,
     INTEROP_MS,
     MODELS_TILE,
@@ -19,8 +19,8 @@ from experiments.ru2016.setting import (
     published,
     waits_ms,
 )
-from reports.plots import paired_bars
-from simulator.run import Run
+from tilestamp.reports.plots import paired_bars
+from tilestamp.simulator.run import Run
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

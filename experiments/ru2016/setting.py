@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from models.errors import TilestampError
-from models.price import Fidelity
-from simulator.run import Run
-from simulator.scenes.camera import Camera, LookAt
-from simulator.scenes.library import load_scene
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.price import Fidelity
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.camera import Camera, LookAt
+from tilestamp.simulator.scenes.library import load_scene
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
 
 MACHINE = "gt750m"
 SIZE = 800  # pixels

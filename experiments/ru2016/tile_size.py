@@ -4,12 +4,21 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result, Status
-from experiments.ru2016.setting import INTEROP_MS, MACHINE, SOURCE, draw, frame_ms, missing, published, waits_ms
-from models.machine import load_machine
-from models.occupancy import residency
-from reports.plots import paired_bars
-from simulator.run import Run
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.ru2016.setting import (
+    INTEROP_MS,
+    MACHINE,
+    SOURCE,
+    draw,
+    frame_ms,
+    missing,
+    published,
+    waits_ms,
+)
+from tilestamp.models.machine import load_machine
+from tilestamp.models.occupancy import residency
+from tilestamp.reports.plots import paired_bars
+from tilestamp.simulator.run import Run
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

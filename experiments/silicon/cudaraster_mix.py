@@ -1,10 +1,10 @@
 """The instruction mix of CudaRaster on compute capability 9.0, written from its machine code and a few fitted numbers.
 
-    python -m experiments.silicon.cudaraster_mix LISTING > simulator/mixes/cudaraster/cc9.toml
+    python -m tilestamp.experiments.silicon.cudaraster_mix LISTING > simulator/mixes/cudaraster/cc9.toml
 
 LISTING is what ``cuobjdump -sass`` prints (see ``cudaraster_blocks``). Instructions of each event by class, and by the
 compiler's schedule the cycles that a lone warp needs for them, are read from the code. ``FITTED`` holds what the blocks
-do not say: it was fitted by ``experiments.silicon.leave_one_out``, which also shows how far the fit carries.
+do not say: it was fitted by ``tilestamp.experiments.silicon.leave_one_out``, which also shows how far the fit carries.
 """
 
 import sys
@@ -12,9 +12,9 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from experiments.silicon import sass
-from experiments.silicon.cudaraster_blocks import CHAINS, LANES, PASSED, REGISTERS, RUNS, Events, Run
-from experiments.silicon.sass import Block
+from tilestamp.experiments.silicon import sass
+from tilestamp.experiments.silicon.cudaraster_blocks import CHAINS, LANES, PASSED, REGISTERS, RUNS, Events, Run
+from tilestamp.experiments.silicon.sass import Block
 
 ALU_CYCLES = 4.11  # of one step of chain_alu: the machine file's latency.alu_cycles
 BARRIER_CYCLES = 24.0  # a barrier of 16 warps takes longer than the machine file's, of 4 (microbenchmarks.csv)

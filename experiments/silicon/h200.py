@@ -6,13 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.result import Cell, Figure, Result, Status
-from experiments.validation.quantities import SHORTEST_US, TIME, WALL
-from experiments.validation.stored import compare
-from experiments.validation.summary import by_kernel, by_scene, fastest_tiles
-from models.errors import TilestampError
-from models.machine import load_machine
-from reports.plots import paired_bars
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
+from tilestamp.experiments.validation.stored import compare
+from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.result import Cell, Result
-from experiments.silicon import cudaraster_mix, freepipe_mix
-from experiments.silicon.h200 import SOURCE, folder
-from experiments.validation.quantities import SHORTEST_US, TIME_METRIC, warm_microseconds
-from experiments.validation.stored import CUDARASTER, FREEPIPE, cudaraster_works, freepipe_works, read
-from models.events import INSTRUCTION_CLASSES
-from models.events import MachineEvent as E
-from models.launch import Launch
-from models.machine import Machine, load_machine
-from simulator.mix import load_mix
-from simulator.work import Work
+from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.silicon import cudaraster_mix, freepipe_mix
+from tilestamp.experiments.silicon.h200 import SOURCE, folder
+from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME_METRIC, warm_microseconds
+from tilestamp.experiments.validation.stored import CUDARASTER, FREEPIPE, cudaraster_works, freepipe_works, read
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.events import MachineEvent as E
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.work import Work
 
 SLOW = True  # counts every scene
 

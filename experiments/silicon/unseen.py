@@ -11,12 +11,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from experiments.result import Cell, Result
-from experiments.silicon.unseen_scenes import write_inputs
-from experiments.validation.quantities import SHORTEST_US, TIME, WALL
-from experiments.validation.stored import compare
-from experiments.validation.summary import by_kernel, by_scene, fastest_tiles
-from models.machine import load_machine
+from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.silicon.unseen_scenes import write_inputs
+from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
+from tilestamp.experiments.validation.stored import compare
+from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
+from tilestamp.models.machine import load_machine
 
 if TYPE_CHECKING:
     import pandas as pd

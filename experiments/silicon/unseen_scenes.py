@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes import LookAt, load_scene, read_camera
-from simulator.stages.vertex_transform import clip_positions, triangle_mesh
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes import LookAt, load_scene, read_camera
+from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh
 
 SIZE = (1024, 768)  # pixels: only its aspect ratio counts
 SEED = 20261122

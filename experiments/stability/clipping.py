@@ -12,18 +12,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, Scale, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, barycentric_cover, draw, machine, plane_cover, stamp_cover
-from reports.maps import value_maps
-from simulator.reference.coverage import exact_visibility
-from simulator.run import Run
-from simulator.scenes.scene import Scene
-from simulator.scenes.textured_mesh import geometry
-from simulator.stages.fatahalian2009.micropolygon_cover import new_setup
-from simulator.stages.fatahalian2009.micropolygons import from_mesh
-from simulator.stages.ru2016.vertex_shading import primitive_assembly, vertex_shading
-from simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, Scale, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import MACHINE, barycentric_cover, draw, machine, plane_cover, stamp_cover
+from tilestamp.reports.maps import value_maps
+from tilestamp.simulator.reference.coverage import exact_visibility
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.textured_mesh import geometry
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import new_setup
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import from_mesh
+from tilestamp.simulator.stages.ru2016.vertex_shading import primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
 
 SIZE = 64  # pixels
 WRONG = 0.01  # share of the screen from which we say that it breaks

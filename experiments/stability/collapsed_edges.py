@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.patch_frames import Split, simt_of
-from reports.plots import lines
-from simulator.scenes import load_scene
-from simulator.scenes.camera import LookAt
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.dice import dice
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.patch_frames import Split, simt_of
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes import load_scene
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
 
 if TYPE_CHECKING:
     from pathlib import Path

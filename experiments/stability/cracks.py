@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.patch_frames import MACHINE, Drawn, Split, draw, milliseconds, simt_of, split
-from reports.plots import lines
-from reports.ste_plots import wrong_pixels
-from simulator.scenes.camera import LookAt
-from simulator.stages.eisenacher2010.snap_edges import Snapped, shared_edges, snap_edges, snap_works
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.patch_frames import MACHINE, Drawn, Split, draw, milliseconds, simt_of, split
+from tilestamp.reports.plots import lines
+from tilestamp.reports.ste_plots import wrong_pixels
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, shared_edges, snap_edges, snap_works
 
 if TYPE_CHECKING:
     import pandas as pd

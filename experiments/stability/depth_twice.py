@@ -3,7 +3,7 @@
 Zhang (2025, "Limitation & Failure Case") reports holes of one pixel in release builds and suspects the conversion of
 float depth to unsigned. Early z puts the least integer depth of a pixel into the depth buffer; the fragment's depth is
 evaluated again for the ROP, which drops what is greater than the buffer. In the public source's first version the
-second evaluation steps three pixels of a quad from the fourth (`simulator.stages.zhang2025.depth`): where it comes out
+second evaluation steps three pixels of a quad from the fourth (``zhang2025.depth``): where it comes out
 larger, the pixel keeps no fragment at all. The same happens where a compiler contracts a multiplication and an addition
 in one of two equal expressions (assumed, for comparison).
 
@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numba import njit
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, machine
-from reports.plots import lines
-from simulator.stages.laine2011.exact import fma
-from simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS, depth_24_bit, fragment_depth
-from simulator.stages.zhang2025.triangle_setup import evaluate
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import MACHINE, machine
+from tilestamp.models.kernel import kernel
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.stages.laine2011.exact import fma
+from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS, depth_24_bit, fragment_depth
+from tilestamp.simulator.stages.zhang2025.triangle_setup import evaluate
 
 SIZE = 64  # pixels
 PLANES = 16  # directions in which the plane rises
@@ -73,7 +73,7 @@ def _tilt(name: str, way: int) -> Boundary:
     return Boundary(method, parameter, "of the range", *boundary(way), wrong, cure, cost)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _evaluate_twice(planes: Any, way: Any, first: Any, second: Any) -> None:
     """Integer depths (H, W) over the pixels: as early z has them, and as the ROP gets them ``way``."""
     a, b, c = planes[0]

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.patch_frames import Drawn, draw, flat_patch, milliseconds, split
-from reports.plots import lines
-from reports.ste_plots import wrong_pixels
-from simulator.stages.eisenacher2010.dice import Grids
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.patch_frames import Drawn, draw, flat_patch, milliseconds, split
+from tilestamp.reports.plots import lines
+from tilestamp.reports.ste_plots import wrong_pixels
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.work import Work
+    from tilestamp.simulator.work import Work
 
 WIDTH, HEIGHT = 192, 144  # pixels
 WAVE = 6.0  # pixels from bump to bump

@@ -8,13 +8,13 @@ ever. A queue entry of 8 bytes (ours) ends it after 14 halvings, and what is sti
 from functools import cache
 from typing import TYPE_CHECKING
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
-from reports.plots import lines
-from simulator.scenes.camera import LookAt
-from simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH
 
 if TYPE_CHECKING:
     from pathlib import Path

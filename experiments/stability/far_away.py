@@ -13,14 +13,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, draw
-from reports.plots import lines
-from simulator.reference.coverage import exact_coverage
-from simulator.scenes import LookAt, Scene
-from simulator.scenes.scene import Mesh, Patches
-from simulator.stages.fatahalian2009.micropolygons import from_mesh
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import MACHINE, draw
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.reference.coverage import exact_coverage
+from tilestamp.simulator.scenes import LookAt, Scene
+from tilestamp.simulator.scenes.scene import Mesh, Patches
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import from_mesh
 
 SIZE = 64  # pixels
 AROUND, DOWN = 24, 12  # quads of the sphere

@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.patch_frames import milliseconds, simt_of
-from reports.maps import value_maps
-from reports.plots import lines
-from simulator.stages.fatahalian2009.across_polygons import across_polygons
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.yao2011.bit_mask import MaskKind, bit_mask
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.patch_frames import milliseconds, simt_of
+from tilestamp.reports.maps import value_maps
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.yao2011.bit_mask import MaskKind, bit_mask
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.work import Work
+    from tilestamp.simulator.work import Work
 
 SLOW = True  # the kernels of the bit mask take longer to compile than all else of the atlas
 

@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, barycentric_cover, draw, plane_edges, quantized
-from reports.plots import lines
-from simulator.reference.coverage import exact_visibility
-from simulator.scenes.scene import Scene
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import MACHINE, barycentric_cover, draw, plane_edges, quantized
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.reference.coverage import exact_visibility
+from tilestamp.simulator.scenes.scene import Scene
 
 SIZE = 64  # pixels
 BASE, TALLEST = 40.0, 48.0  # pixels

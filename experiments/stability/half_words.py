@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from reports.plots import lines
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 SIZE = 128  # pixels a side
 GAPS = tuple(2.0**-k for k in range(12, 25))  # NDC depth between the two layers

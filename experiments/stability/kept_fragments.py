@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.layers import layered
-from reports.plots import lines
-from simulator.simulation import simulate
-from simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, OVERDRAW
-from simulator.stages.zhang2025.rop import KEPT
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.layers import layered
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.simulation import simulate
+from tilestamp.simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, OVERDRAW
+from tilestamp.simulator.stages.zhang2025.rop import KEPT
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from simulator.scenes.camera import LookAt
-from simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.scenes.scene import Mesh, Scene
 
 WARP = 32  # triangles that stay together
 VIEW = LookAt((0, 0, 5), (0, 0, 0), (0, 1, 0), 30.0, 1.0, 20.0)

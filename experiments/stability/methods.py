@@ -10,18 +10,18 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.machine import Machine, load_machine
-from simulator import Run, simulate
-from simulator.reference.coverage import exact_coverage
-from simulator.scenes.scene import Scene
-from simulator.stages.eisenacher2010.tile_range import screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, new_setup, set_up
-from simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
-from simulator.stages.zhang2025.fine_tile import coverage
+from tilestamp import Run, simulate
+from tilestamp.models.kernel import kernel
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.simulator.reference.coverage import exact_coverage
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, new_setup, set_up
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
+from tilestamp.simulator.stages.zhang2025.fine_tile import coverage
 
 MACHINE = "h200"
 STEPS = 65536  # a pixel
@@ -184,7 +184,7 @@ def _screen(points: NDArray[np.float64], size: int) -> NDArray[np.float32]:
     return screen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def barycentric_cover(screen: Any, triangles: Any, count: Any, depth: Any) -> None:
     """Count the triangles of each pixel, (H, W) from the top, and keep the least depth of each.
 
@@ -207,7 +207,7 @@ def barycentric_cover(screen: Any, triangles: Any, count: Any, depth: Any) -> No
                     depth[y, x] = min(depth[y, x], z)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def stamp_cover(polygons: Any, edges: Any, boxes: Any, depths: Any, snapped: Any, count: Any) -> None:
     """Count the polygons of each pixel, (H, W) from the top; ``new_setup`` gives the scratch."""
     for p in range(len(polygons)):

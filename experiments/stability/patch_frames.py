@@ -7,18 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.machine import load_machine
-from models.price import price
-from models.simt import Simt
-from simulator.mix import load_mix
-from simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH, SubPatches, bound_and_split
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write
-from simulator.stages.eisenacher2010.dice import Grids, dice
-from simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.work import Work
+from tilestamp.models.machine import load_machine
+from tilestamp.models.price import price
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH, SubPatches, bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.work import Work
 
 MACHINE = "gtx280"  # the paper's
 

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.layers import layered
-from reports.heatmap import heat_map
-from reports.plots import lines
-from simulator.simulation import simulate
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.layers import layered
+from tilestamp.reports.heatmap import heat_map
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
-from reports.plots import lines
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
+from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:
     from pathlib import Path

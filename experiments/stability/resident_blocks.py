@@ -7,13 +7,13 @@ of the two grid synchronisations have none.
 
 from typing import TYPE_CHECKING
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from models.machine import Machine, load_machine
-from models.occupancy import residency
-from reports.plots import lines
-from simulator.stages.zhang2025.primitive_compaction import BLOCK, REGISTERS, SLOTS_A_TRIANGLE
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.models.occupancy import residency
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.stages.zhang2025.primitive_compaction import BLOCK, REGISTERS, SLOTS_A_TRIANGLE
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.patch_frames import milliseconds, simt_of
-from reports.plots import lines
-from simulator.run import Run
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
-from simulator.stages.laine2011 import bin_raster as bins
-from simulator.stages.laine2011 import coarse_raster as tiles
-from simulator.stages.laine2011.triangle_setup import SLACK, triangle_setup
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.patch_frames import milliseconds, simt_of
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
+from tilestamp.simulator.stages.laine2011 import bin_raster as bins
+from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.triangle_setup import SLACK, triangle_setup
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.work import Work
+    from tilestamp.simulator.work import Work
 
 SIZE = 512  # pixels a side: 16 bins, 4096 tiles
 MACHINE = "gtx480"

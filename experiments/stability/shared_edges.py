@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import METHODS, QUADS, Cover, quad_lattice, quantized
-from reports.plots import lines
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import METHODS, QUADS, Cover, quad_lattice, quantized
+from tilestamp.reports.plots import lines
 
 SIZE = 128  # pixels
 CELL = 16  # pixels between the corners of the mesh

@@ -13,10 +13,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
-from experiments.stability.methods import MACHINE, METHODS, STEPS, Cover, Method, draw, exact, flat_scene, quantized
-from reports.maps import value_maps
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
+from tilestamp.experiments.stability.methods import (
+    MACHINE,
+    METHODS,
+    STEPS,
+    Cover,
+    Method,
+    draw,
+    exact,
+    flat_scene,
+    quantized,
+)
+from tilestamp.reports.maps import value_maps
 
 ANGLES = 12  # from 0 to 90 degrees
 PLACES = 12

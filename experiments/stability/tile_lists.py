@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.registry import Progress
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.layers import VIEW
-from reports.plots import lines
-from simulator.scenes.scene import Mesh, Scene
-from simulator.simulation import simulate
+from tilestamp.experiments.registry import Progress
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.layers import VIEW
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
-    from simulator.run import Run
+    from tilestamp.simulator.run import Run
 
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Figure, Result
-from experiments.stability.boundary import Boundary, atlas_result, bisect
-from experiments.stability.methods import MACHINE, draw
-from reports.plots import lines
-from simulator.run import Run
-from simulator.scenes import LookAt, Scene
-from simulator.scenes.scene import Mesh
+from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
+from tilestamp.experiments.stability.methods import MACHINE, draw
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes import LookAt, Scene
+from tilestamp.simulator.scenes.scene import Mesh
 
 SIZE = 32  # pixels
 NEAR, FAR = 0.1, 1000.0  # planes, in world units

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from models.errors import TilestampError
-from models.machine import load_machine
-from models.price import price
-from models.simt import Simt
-from reports.plots import lines
-from simulator.mix import load_mix
-from simulator.stages.fatahalian2009.across_polygons import across_polygons
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
-from simulator.stages.yao2011.bit_mask import bit_mask
-from simulator.work import Work
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.models.price import price
+from tilestamp.models.simt import Simt
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
+from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask
+from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from models.simt import Simt
-from reports.plots import lines
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape
-from simulator.stages.fatahalian2009.stamps_count import count_tests
-from simulator.stages.yao2011.bit_mask import BitMaskEvent, bit_mask
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.simt import Simt
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.simulator.stages.yao2011.bit_mask import BitMaskEvent, bit_mask
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

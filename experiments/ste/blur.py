@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from experiments.ste.setting import random_polygons
-from reports.plots import lines
-from reports.ste_plots import heat_maps
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples
-from simulator.stages.fatahalian2009.motion import (
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.ste.setting import random_polygons
+from tilestamp.reports.plots import lines
+from tilestamp.reports.ste_plots import heat_maps
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples
+from tilestamp.simulator.stages.fatahalian2009.motion import (
     BlurPattern,
     MotionEvent,
     MovingMicropolygons,
@@ -24,9 +24,9 @@ from simulator.stages.fatahalian2009.motion import (
     moved,
     stratified_pattern,
 )
-from simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
-from simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
-from simulator.work import Work
+from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
+from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

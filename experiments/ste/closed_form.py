@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from experiments.ste.setting import CONFIDENCE, random_polygons, student
-from reports.plots import lines
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape
-from simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.ste.setting import CONFIDENCE, random_polygons, student
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

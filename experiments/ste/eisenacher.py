@@ -9,16 +9,16 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from experiments.ste.closed_form import expected
-from experiments.ste.setting import mean_area, random_polygons
-from models.errors import TilestampError
-from reports.plots import lines
-from simulator.scenes import load_scene, read_camera
-from simulator.stages.fatahalian2009.micropolygons import from_patches
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape
-from simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.ste.closed_form import expected
+from tilestamp.experiments.ste.setting import mean_area, random_polygons
+from tilestamp.models.errors import TilestampError
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.scenes import load_scene, read_camera
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import from_patches
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

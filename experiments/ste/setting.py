@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simulator.scenes.camera import fit_camera
-from simulator.scenes.catmull_clark import Surface, subdivide, surface_of
-from simulator.scenes.quad_cage import Cage, read_cage
-from simulator.scenes.search_path import find_scene
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons, from_surface
+from tilestamp.simulator.scenes.camera import fit_camera
+from tilestamp.simulator.scenes.catmull_clark import Surface, subdivide, surface_of
+from tilestamp.simulator.scenes.quad_cage import Cage, read_cage
+from tilestamp.simulator.scenes.search_path import find_scene
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, from_surface
 
 CUBE_CORNERS = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 CUBE_FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

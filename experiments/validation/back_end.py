@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.validation.shuffle import shuffled
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.scenes import load_scene
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write
-from simulator.stages.eisenacher2010.dice import Grids, dice
-from simulator.stages.eisenacher2010.tile_range import TILE_SIZES, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.work import Work
+from tilestamp.experiments.validation.shuffle import shuffled
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes import load_scene
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.tile_range import TILE_SIZES, screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.work import Work
 
 CAMERAS = "micropolygon_cameras.json"
 SHUFFLED = "_shuffle"

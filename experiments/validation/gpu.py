@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
 
 REPEATS = 9
 BUSY = 0.15  # spread of repeats from which a GPU counts as busy
@@ -38,7 +38,7 @@ def cupy() -> Any:
 @cache
 def module(name: str, options: tuple[str, ...] = ()) -> Any:
     """Compile one of our CUDA sources for this GPU."""
-    source = resources.files("experiments").joinpath("cuda", name).read_text("utf-8")
+    source = resources.files("tilestamp.experiments").joinpath("cuda", name).read_text("utf-8")
     return cupy().RawModule(code=source, options=("-std=c++17", *options))
 
 

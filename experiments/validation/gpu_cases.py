@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.validation.gpu import cupy, module
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.scenes import load_scene, read_camera
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.bucket_count import BLOCK, bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write
-from simulator.stages.eisenacher2010.dice import Grids, dice
-from simulator.stages.eisenacher2010.tile_range import TILE_SIZES, Tiles, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.stages.laine2011.triangle_setup import triangle_setup
-from simulator.stages.liu2010.freepipe import freepipe
-from simulator.stages.vertex_transform import clip_positions, triangle_mesh
-from simulator.work import Work
+from tilestamp.experiments.validation.gpu import cupy, module
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes import load_scene, read_camera
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import BLOCK, bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.tile_range import TILE_SIZES, Tiles, screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
+from tilestamp.simulator.stages.liu2010.freepipe import freepipe
+from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh
+from tilestamp.simulator.work import Work
 
 SCENE, WIDTH, HEIGHT, BOUND = "teapot", 1024, 768, 4.0
 BACK_END, TRIANGLES = "back_end.cu", "triangles.cu"

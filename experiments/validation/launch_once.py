@@ -1,8 +1,8 @@
 """Launch every kernel of ``gpu_cases`` once, for a profiler to watch (``python -m`` this module)."""
 
-from experiments.validation.gpu import cupy
-from experiments.validation.gpu_cases import gpu_cases
-from models.machine import load_machine
+from tilestamp.experiments.validation.gpu import cupy
+from tilestamp.experiments.validation.gpu_cases import gpu_cases
+from tilestamp.models.machine import load_machine
 
 
 def main() -> None:

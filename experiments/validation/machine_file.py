@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
-from experiments.validation.gpu import BUSY
-from experiments.validation.measuring import Number
-from models.machine import SECTIONS, Machine
+from tilestamp.experiments.validation.gpu import BUSY
+from tilestamp.experiments.validation.measuring import Number
+from tilestamp.models.machine import SECTIONS, Machine
 
 WHOLE = ("count", "warp_size", "max_", "registers", "_bytes", "banks", "units", "unit_bytes")
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from experiments.validation.gpu import cupy
-from experiments.validation.measuring import Number, arithmetic, attribute, clock, device, latencies
-from experiments.validation.measuring_memory import atomics, bandwidths, launches
-from models.errors import TilestampError
+from tilestamp.experiments.validation.gpu import cupy
+from tilestamp.experiments.validation.measuring import Number, arithmetic, attribute, clock, device, latencies
+from tilestamp.experiments.validation.measuring_memory import atomics, bandwidths, launches
+from tilestamp.models.errors import TilestampError
 
 NEEDED_BYTES = 3 << 30
 

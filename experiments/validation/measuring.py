@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.validation.gpu import REPEATS, cupy, launch, microseconds, spread
+from tilestamp.experiments.validation.gpu import REPEATS, cupy, launch, microseconds, spread
 
 CHAIN = 128  # rounds of UNROLLED operations
 UNROLLED = 16

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.validation.gpu import cupy, in_a_graph, launch, microseconds, module, spread
-from experiments.validation.measuring import MIB, Number, attribute, cycles_of, number
+from tilestamp.experiments.validation.gpu import cupy, in_a_graph, launch, microseconds, module, spread
+from tilestamp.experiments.validation.measuring import MIB, Number, attribute, cycles_of, number
 
 ROUNDS = 64  # atomics a thread
 SPACINGS = (32, 64, 128, 256, 512, 1024, 2048, 4096)  # bytes between counters

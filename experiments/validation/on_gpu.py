@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.validation.gpu import BUSY, in_a_graph, microseconds, spread
-from experiments.validation.gpu_cases import SCENE, WIDTH, GpuCase, gpu_cases
-from experiments.validation.profiler import counters
-from experiments.validation.quantities import QUANTITIES, TIME, TIME_AIM, warm_microseconds
-from models.launch import Launch
-from models.machine import Machine
-from simulator.mix import load_mix
+from tilestamp.experiments.validation.gpu import BUSY, in_a_graph, microseconds, spread
+from tilestamp.experiments.validation.gpu_cases import SCENE, WIDTH, GpuCase, gpu_cases
+from tilestamp.experiments.validation.profiler import counters
+from tilestamp.experiments.validation.quantities import QUANTITIES, TIME, TIME_AIM, warm_microseconds
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.simulator.mix import load_mix
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
-from experiments.validation.quantities import QUANTITIES
+from tilestamp.experiments.validation.quantities import QUANTITIES
 
 KERNELS = "address_calculation|bucket_write|tile_raster|freepipe|freepipe_early|triangle_setup"
 LANES, INSTRUCTIONS = "smsp__thread_inst_executed.sum", "smsp__inst_executed.sum"
@@ -35,7 +35,7 @@ def counters() -> tuple[list[dict[str, float]], str]:
     if ncu is None:
         return [], "no counters: NVIDIA's profiler ncu is not installed here"
     command = [ncu, "--csv", "--page", "raw", "--clock-control", "none", "--kernel-name", f"regex:^({KERNELS})$"]
-    command += ["--metrics", ",".join(metrics()), sys.executable, "-m", "experiments.validation.launch_once"]
+    command += ["--metrics", ",".join(metrics()), sys.executable, "-m", "tilestamp.experiments.validation.launch_once"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)  # noqa: S603 - ours
     except subprocess.TimeoutExpired:

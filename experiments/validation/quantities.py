@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from models.events import INSTRUCTION_CLASSES
-from models.events import MachineEvent as E
-from models.launch import Launch
-from models.machine import Machine
-from models.price import price
-from models.traffic import Traffic
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.events import MachineEvent as E
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.price import price
+from tilestamp.models.traffic import Traffic
 
 SHORTEST_US = 5.0  # kernels below are measured, and not judged
 _SECTORS = "l1tex__t_sectors_pipe_lsu_mem_global_op_{}.sum"

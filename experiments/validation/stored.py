@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.validation.back_end import PADDED, SHUFFLED, back_end, cameras, grids_of
-from experiments.validation.quantities import (
+from tilestamp.experiments.validation.back_end import PADDED, SHUFFLED, back_end, cameras, grids_of
+from tilestamp.experiments.validation.quantities import (
     MOVED,
     MOVED_AIM,
     MOVED_LOCAL,
@@ -18,15 +18,15 @@ from experiments.validation.quantities import (
     WALL_AIM,
     warm_microseconds,
 )
-from models.errors import TilestampError
-from models.launch import Launch
-from models.machine import Machine
-from models.traffic import traffic
-from simulator.mix import load_mix
-from simulator.pipelines import load_pipeline
-from simulator.scenes import load_scene
-from simulator.stages.laine2011.parameter_copy import COPYING, VARIANT, with_parameter_copy
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
+from tilestamp.models.traffic import traffic
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.scenes import load_scene
+from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, VARIANT, with_parameter_copy
+from tilestamp.simulator.work import Work
 
 if TYPE_CHECKING:
     import pandas as pd

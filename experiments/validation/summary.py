@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.validation.quantities import SHORTEST_US, TIME, WALL
+from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
 
 if TYPE_CHECKING:
     import pandas as pd

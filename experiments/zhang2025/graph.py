@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result, Status
-from experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, published
-from models.launch_graph import Node, as_graph, on_stream
-from models.machine import Machine, load_machine
-from reports.plots import stacked_bars
+from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, published
+from tilestamp.models.launch_graph import Node, as_graph, on_stream
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.reports.plots import stacked_bars
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE, bunny, draw, profiled, published
-from models.machine import altered, load_machine
-from models.price import price
-from models.timing import Timing
-from reports.plots import paired_bars
-from simulator.run import Run
-from simulator.stages.zhang2025.primitive_compaction import most_triangles
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE, bunny, draw, profiled, published
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.price import price
+from tilestamp.models.timing import Timing
+from tilestamp.reports.plots import paired_bars
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.result import Cell, Figure, Result
-from models.errors import TilestampError
-from models.machine import load_machine
-from reports.style import figure
-from simulator.frame import Frame
-from simulator.pipelines import load_pipeline
-from simulator.scenes.camera import LookAt
-from simulator.scenes.library import load_scene
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
+from tilestamp.reports.style import figure
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.scenes.camera import LookAt
+from tilestamp.simulator.scenes.library import load_scene
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

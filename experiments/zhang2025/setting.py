@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from models.errors import TilestampError
-from models.machine import Machine, altered, load_machine
-from simulator.run import Run
-from simulator.scenes.library import load_scene
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.textured_mesh import vertex_normals
-from simulator.simulation import simulate
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.library import load_scene
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.textured_mesh import vertex_normals
+from tilestamp.simulator.simulation import simulate
 
 WIDTH, HEIGHT = 1920, 1080
 CANDIDATES = ("ga104", "rtx3080")

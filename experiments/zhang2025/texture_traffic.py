@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from experiments.result import Cell, Figure, Result
-from models.machine import load_machine
-from models.simt import Simt
-from reports.plots import lines
-from simulator.pipelines.binned import binned
-from simulator.scenes.scene import Mesh, Scene
-from simulator.work import Work
+from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.models.machine import load_machine
+from tilestamp.models.simt import Simt
+from tilestamp.reports.plots import lines
+from tilestamp.simulator.pipelines.binned import binned
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 

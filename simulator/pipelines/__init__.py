@@ -12,8 +12,8 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from models.errors import TilestampError
-from simulator.frame import Frame
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.frame import Frame
 
 Pipeline = Callable[..., Frame]
 INTERNAL = ("sample", "picture")  # keywords that a pipeline may have for simulate
@@ -35,7 +35,7 @@ def load_pipeline(name: str) -> Pipeline:
     if name not in pipeline_names():
         raise TilestampError(f"no pipeline is called {name}; there are {', '.join(pipeline_names())}")
     module = name.replace("-", "_")
-    pipeline: Pipeline = getattr(import_module(f"simulator.pipelines.{module}"), module)
+    pipeline: Pipeline = getattr(import_module(f"tilestamp.simulator.pipelines.{module}"), module)
     return pipeline
 
 

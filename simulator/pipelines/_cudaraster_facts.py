@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from simulator.stages.laine2011 import bin_raster as bins
-from simulator.stages.laine2011 import coarse_raster as tiles
-from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
-from simulator.stages.laine2011.triangle_setup import SLACK, SUBTRIANGLE_BYTES
-from simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
-from simulator.work import Work
+from tilestamp.simulator.stages.laine2011 import bin_raster as bins
+from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup import SLACK, SUBTRIANGLE_BYTES
+from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
+from tilestamp.simulator.work import Work
 
 Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name
 

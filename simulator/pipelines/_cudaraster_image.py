@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.stages.laine2011.coarse_raster import TileQueues
-from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
-from simulator.stages.laine2011.fine_raster import FrameBuffers
-from simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
-from simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
-from simulator.stages.laine2011.triangle_setup import Release
-from simulator.work import Work
+from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from tilestamp.simulator.stages.laine2011.triangle_setup import Release
+from tilestamp.simulator.work import Work
 
 
 def shown_sample(samples: int) -> int:

@@ -9,16 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines._cudaraster_facts import first_room
-from simulator.sampler import Sampler
-from simulator.stages.laine2011 import bin_raster as bins
-from simulator.stages.laine2011 import coarse_raster as tiles
-from simulator.stages.laine2011.fine_raster import MODES, WARP_LINES, WARPS, count_starts, fine_raster, fine_streams
-from simulator.stages.laine2011.sampled_tiles import tile_areas
-from simulator.stages.laine2011.triangle_setup import BLOCK, MAX_SUBTRIANGLES, triangle_setup
-from simulator.work import Work
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._cudaraster_facts import first_room
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.stages.laine2011 import bin_raster as bins
+from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.fine_raster import (
+    MODES,
+    WARP_LINES,
+    WARPS,
+    count_starts,
+    fine_raster,
+    fine_streams,
+)
+from tilestamp.simulator.stages.laine2011.sampled_tiles import tile_areas
+from tilestamp.simulator.stages.laine2011.triangle_setup import BLOCK, MAX_SUBTRIANGLES, triangle_setup
+from tilestamp.simulator.work import Work
 
 
 def sampled_draw(

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.frame import Frame
-from simulator.stages.eisenacher2010.dice import Grids
-from simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, GRID_SIDE, QUADS
-from simulator.stages.hardware import hardware_grids
-from simulator.work import Work
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, GRID_SIDE, QUADS
+from tilestamp.simulator.stages.hardware import hardware_grids
+from tilestamp.simulator.work import Work
 
 
 def draw_grids(grids: Grids, width: int, height: int, works: list[Work], facts: dict[str, Any]) -> Frame:

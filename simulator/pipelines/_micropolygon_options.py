@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.frame import Frame
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.work import Work
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.work import Work
 
 
 def frame_of(samples: Samples, polygons: Micropolygons, works: list[Work], **facts: Any) -> Frame:

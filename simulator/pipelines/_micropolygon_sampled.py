@@ -11,25 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.simt import Simt
-from simulator.sampler import Sampler
-from simulator.stages.eisenacher2010.bound_and_split import SubPatches
-from simulator.stages.eisenacher2010.bucket_count import (
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import (
     BLOCK,
     BucketCountEvent,
     address_work,
     bucket_count,
     init_work,
 )
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write, write_streams
-from simulator.stages.eisenacher2010.dice import dice
-from simulator.stages.eisenacher2010.dice_counts import dice_work
-from simulator.stages.eisenacher2010.sampled_tiles import TileSizes, meeting, tile_sizes
-from simulator.stages.eisenacher2010.tile_range import Tiles
-from simulator.stages.eisenacher2010.tile_raster import raster_streams, tile_raster
-from simulator.stages.eisenacher2010.tile_raster_events import block_shape
-from simulator.work import Work
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write, write_streams
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.dice_counts import dice_work
+from tilestamp.simulator.stages.eisenacher2010.sampled_tiles import TileSizes, meeting, tile_sizes
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import raster_streams, tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import block_shape
+from tilestamp.simulator.work import Work
 
 NOWHERE = np.array([np.inf, np.inf, -np.inf, -np.inf], np.float32)  # box of a lane whose sub-patch is not diced
 CHUNK_WORDS = 8  # counters in 32 bytes

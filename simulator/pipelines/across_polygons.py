@@ -4,15 +4,15 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines._micropolygon_options import frame_of
-from simulator.scenes.scene import Scene
-from simulator.stages.fatahalian2009.across_polygons import Packing
-from simulator.stages.fatahalian2009.across_polygons import across_polygons as walk_boxes
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.micropolygons import micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._micropolygon_options import frame_of
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import Packing
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons as walk_boxes
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 
 
 def across_polygons(

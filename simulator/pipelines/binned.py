@@ -5,26 +5,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines.tiled import check_choices
-from simulator.scenes.scene import Scene
-from simulator.scenes.texture import TILE, texture_chains
-from simulator.scenes.textured_mesh import geometry
-from simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
-from simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
-from simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
-from simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
-from simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, pixel_shader
-from simulator.stages.zhang2025.primitive_assembly import primitive_assembly
-from simulator.stages.zhang2025.primitive_binning import primitive_binning
-from simulator.stages.zhang2025.primitive_compaction import primitive_compaction
-from simulator.stages.zhang2025.rop import KEPT, FragmentDepth, Order, rop
-from simulator.stages.zhang2025.rop_block import RopEvent
-from simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
-from simulator.stages.zhang2025.triangle_setup import triangle_setup
-from simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines.tiled import check_choices
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.texture import TILE, texture_chains
+from tilestamp.simulator.scenes.textured_mesh import geometry
+from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
+from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
+from tilestamp.simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
+from tilestamp.simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
+from tilestamp.simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, pixel_shader
+from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
+from tilestamp.simulator.stages.zhang2025.primitive_binning import primitive_binning
+from tilestamp.simulator.stages.zhang2025.primitive_compaction import primitive_compaction
+from tilestamp.simulator.stages.zhang2025.rop import KEPT, FragmentDepth, Order, rop
+from tilestamp.simulator.stages.zhang2025.rop_block import RopEvent
+from tilestamp.simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
+from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
+from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 
 
 def binned(
@@ -49,7 +49,7 @@ def binned(
     Parameters
     ----------
     scene, matrix, width, height, simt
-        See ``simulator.pipelines``; at most 2048 pixels on a side.
+        See ``tilestamp.simulator.pipelines``; at most 2048 pixels on a side.
     order : {"api", "oit"}
         Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
     texture_filter : {"nearest", "bilinear", "trilinear"}

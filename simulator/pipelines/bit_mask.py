@@ -5,16 +5,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines._micropolygon_options import frame_of, wrong_pixels
-from simulator.scenes.scene import Scene
-from simulator.stages.fatahalian2009.across_polygons import across_polygons
-from simulator.stages.fatahalian2009.micropolygon_samples import new_samples
-from simulator.stages.fatahalian2009.micropolygons import grouped, micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.yao2011.bit_mask import MaskKind
-from simulator.stages.yao2011.bit_mask import bit_mask as filter_samples
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._micropolygon_options import frame_of, wrong_pixels
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import grouped, micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.yao2011.bit_mask import MaskKind
+from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask as filter_samples
 
 
 def bit_mask(

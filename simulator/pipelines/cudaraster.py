@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines._cudaraster_facts import (
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._cudaraster_facts import (
     Counters,
     add_counters,
     fine_counters,
@@ -21,18 +21,18 @@ from simulator.pipelines._cudaraster_facts import (
     frame_facts,
     setup_counters,
 )
-from simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
-from simulator.pipelines._cudaraster_sampled import sampled_draw
-from simulator.sampler import Sampler
-from simulator.scenes.scene import Scene
-from simulator.stages.laine2011 import bin_raster as bins
-from simulator.stages.laine2011 import coarse_raster as tiles
-from simulator.stages.laine2011.coverage import TILE
-from simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
-from simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
-from simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
-from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
-from simulator.work import Work
+from tilestamp.simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
+from tilestamp.simulator.pipelines._cudaraster_sampled import sampled_draw
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.laine2011 import bin_raster as bins
+from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.coverage import TILE
+from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
+from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
+from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
+from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.simulator.work import Work
 
 MAX_BATCHES = 1024
 

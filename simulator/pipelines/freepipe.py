@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.scenes.scene import Scene
-from simulator.stages.liu2010.freepipe import BLOCK, Packing
-from simulator.stages.liu2010.freepipe import freepipe as draw
-from simulator.stages.liu2010.freepipe_shade import pixel_colors
-from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing
+from tilestamp.simulator.stages.liu2010.freepipe import freepipe as draw
+from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
+from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 
 def freepipe(
@@ -29,7 +29,7 @@ def freepipe(
     Parameters
     ----------
     scene, matrix, width, height, simt
-        See ``simulator.pipelines``.
+        See ``tilestamp.simulator.pipelines``.
     packing : {"64", "32"}
         One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then
         a triangle has one colour, the mean of its corners).

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.scenes.scene import Scene
-from simulator.stages.depth_format import DepthFormat
-from simulator.stages.hardware import SUBPIXEL_BITS
-from simulator.stages.hardware import hardware as draw
-from simulator.stages.liu2010.freepipe_shade import pixel_colors
-from simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.depth_format import DepthFormat
+from tilestamp.simulator.stages.hardware import SUBPIXEL_BITS
+from tilestamp.simulator.stages.hardware import hardware as draw
+from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
+from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 
 def hardware(
@@ -31,7 +31,7 @@ def hardware(
     Parameters
     ----------
     scene, matrix, width, height, simt
-        See ``simulator.pipelines``.
+        See ``tilestamp.simulator.pipelines``.
     cull_backfaces : bool
         Leave out what is clockwise on the screen.
     bits : int

@@ -10,23 +10,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines._micropolygon_hybrid import draw_grids
-from simulator.pipelines._micropolygon_sampled import sampled_back_end
-from simulator.sampler import Sampler
-from simulator.scenes.scene import Scene
-from simulator.stages.eisenacher2010 import snap_edges as snapping
-from simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.bucket_write import bucket_write
-from simulator.stages.eisenacher2010.dice import dice
-from simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
-from simulator.stages.eisenacher2010.tile_raster import tile_raster
-from simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
+from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.eisenacher2010 import snap_edges as snapping
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from tilestamp.simulator.work import Work
 
 
 def micropolygon(

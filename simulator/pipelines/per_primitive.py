@@ -5,18 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.pipelines.tiled import check_choices, not_drawn
-from simulator.scenes.scene import Scene
-from simulator.scenes.texture import texture_chains
-from simulator.scenes.textured_mesh import draws, geometry
-from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
-from simulator.stages.ru2016.clear import clear
-from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
-from simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
-from simulator.stages.ru2016.tiled_raster import Visible
-from simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines.tiled import check_choices, not_drawn
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.texture import texture_chains
+from tilestamp.simulator.scenes.textured_mesh import draws, geometry
+from tilestamp.simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
+from tilestamp.simulator.stages.ru2016.clear import clear
+from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
+from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
+from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
+from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
 
 
 def per_primitive(
@@ -37,7 +37,7 @@ def per_primitive(
     Parameters
     ----------
     scene, matrix, width, height, simt
-        See ``simulator.pipelines``.
+        See ``tilestamp.simulator.pipelines``.
     cull_backfaces : bool
         Leave out triangles that face away; the original's basic path does not.
     race : bool

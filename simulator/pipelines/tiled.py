@@ -5,19 +5,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.frame import Frame
-from simulator.scenes.scene import Scene
-from simulator.scenes.texture import texture_chains
-from simulator.scenes.textured_mesh import draws, geometry
-from simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
-from simulator.stages.ru2016.clear import clear
-from simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
-from simulator.stages.ru2016.tile_lists import Capacity, tile_lists
-from simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
-from simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.texture import texture_chains
+from tilestamp.simulator.scenes.textured_mesh import draws, geometry
+from tilestamp.simulator.stages.ru2016.ambient_occlusion import ambient_occlusion
+from tilestamp.simulator.stages.ru2016.clear import clear
+from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
+from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
+from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
+from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.work import Work
 
 TILES = range(4, 33)  # pixels on a side; 33x33 threads would be more than a block can have
 
@@ -41,7 +41,7 @@ def tiled(
     Parameters
     ----------
     scene, matrix, width, height, simt
-        See ``simulator.pipelines``.
+        See ``tilestamp.simulator.pipelines``.
     tile : int
         Pixels on a side of a tile, 4 to 32.
     cull_backfaces : bool

@@ -9,12 +9,12 @@ the screen; what lies outside -1 to 1 is cut off sample by sample. Of equal dept
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.parallel import for_parts, parts_of
-from simulator.reference.orientation import COMPONENTS, edge_function, edge_sign, sure_sign
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.reference.orientation import COMPONENTS, edge_function, edge_sign, sure_sign
 
 CENTRE = (0.5, 0.5)
 _PART_ROWS = 16  # at least
@@ -39,7 +39,7 @@ class Visible(NamedTuple):
     hits: NDArray[np.int32]  # (rows, columns) triangles that cover the sample
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_up(corners, edges, owns, expansion):
     """Edge functions opposite to corners 0, 1, 2, positive inside; returns the orientation, 0 where it has no area.
 
@@ -65,7 +65,7 @@ def set_up(corners, edges, owns, expansion):
     return sign
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _owns_closely(corners, owns, sign, x, y, a, b, c, near, expansion):
     """Whether a sample is covered that is inside, or on one of the three edges as far as ``near`` can tell."""
     for k in range(3):
@@ -77,7 +77,7 @@ def _owns_closely(corners, owns, sign, x, y, a, b, c, near, expansion):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _span(triangle, axis, first, step, count):
     """First and last grid line that a triangle can touch, or one more; all where it crosses the eye's plane."""
     low, high = np.inf, -np.inf
@@ -91,7 +91,7 @@ def _span(triangle, axis, first, step, count):
     return max(int(np.floor(max(low, 0.0))) - 1, 0), min(int(np.ceil(min(high, float(count)))) + 1, count - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _weights(triangle, depths, t, sign, weights):
     """Factors of the edge functions in z / w: at a sample w is 1, so weights that add up to the determinant do it."""
     det = 0.0
@@ -102,7 +102,7 @@ def _weights(triangle, depths, t, sign, weights):
         weights[k] = depths[t, k] / (sign * det) if det != 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
     """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; the arrays hold only those.
 
@@ -149,7 +149,7 @@ def _draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
                         depth[row, i], ids[row, i] = z, t
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_part(part, parts, corners, depths, cull, grid, first_row, ids, depth, hits):
     first, end = ids.shape[0] * part // parts, ids.shape[0] * (part + 1) // parts
     seen = (ids[first:end], depth[first:end], hits[first:end])

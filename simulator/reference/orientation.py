@@ -7,7 +7,7 @@ that of the largest. No rounding happens anywhere, unless a product leaves the r
 float32 (times a width below 2**20) cannot make one that does.
 """
 
-from numba import njit
+from tilestamp.models.kernel import kernel
 
 COMPONENTS = 32  # six products of four doubles each, and room
 _SPLITTER = 134217729.0  # 2**27 + 1
@@ -16,7 +16,7 @@ _BOUND = (
 )  # an edge function is rounded five times, by half a unit in the last place; eight are allowed for
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def two_sum(a, b):
     """Sum of two doubles, and what rounding took from it (Knuth)."""
     total = a + b
@@ -24,7 +24,7 @@ def two_sum(a, b):
     return total, (a - (total - part)) + (b - part)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def two_product(a, b):
     """Product of two doubles, and what rounding took from it (Dekker)."""
     product = a * b
@@ -37,7 +37,7 @@ def two_product(a, b):
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _grow(expansion, n, b):
     """Add a double to an expansion of ``n`` components; returns how many there are then."""
     kept = 0
@@ -52,7 +52,7 @@ def _grow(expansion, n, b):
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_product(expansion, n, a, b, c):
     """Add a b c to an expansion."""
     high, low = two_product(a, b)
@@ -63,7 +63,7 @@ def _add_product(expansion, n, a, b, c):
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def edge_sign(p, q, x, y, w, expansion):
     """Exact sign, -1, 0 or 1, of det(p, q, (x, y, w)).
 
@@ -84,7 +84,7 @@ def edge_sign(p, q, x, y, w, expansion):
     return 0 if n == 0 else 1 if expansion[n - 1] > 0.0 else -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def edge_function(p, q, edge):
     """Coefficients of x, y and w of det(p, q, (x, y, w)) in double precision, and of its error bound, to ``edge`` (6,).
 
@@ -96,7 +96,7 @@ def edge_function(p, q, edge):
         edge[3 + k] = _BOUND * (abs(p[i] * q[j]) + abs(p[j] * q[i]))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sure_sign(edge, p, q, x, y, w, expansion):
     """Exact sign of det(p, q, (x, y, w)): by the rounded ``edge`` where its bound allows, by expansions elsewhere."""
     value = edge[0] * x + edge[1] * y + edge[2] * w

@@ -8,12 +8,12 @@ mip level, and no choice of a filter, is taken for the truth.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.parallel import for_parts, parts_of
-from simulator.reference.coverage import CENTRE, cover, pixel_grid
-from simulator.scenes.texture import add_bilinear, texture_chains
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.reference.coverage import CENTRE, cover, pixel_grid
+from tilestamp.simulator.scenes.texture import add_bilinear, texture_chains
 
 SIDE = 16  # samples along a pixel: where an edge runs along the rows, 1/32 of its contrast is left at most
 _BAND = 32  # rows of pixels drawn at once, which bounds the memory
@@ -36,7 +36,7 @@ class Surface(NamedTuple):
     background: NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shade(surface, chains, t, x, y, texel, sample):
     """Colour of triangle t at a sample."""
     planes = surface.planes
@@ -53,7 +53,7 @@ def _shade(surface, chains, t, x, y, texel, sample):
             sample[c] *= texel[c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _pixel(surface, chains, ids, grid, j, i, side, first, sample, texel, out):
     """Mean of the samples of pixel (i, j) of a band whose first row of samples is ``first``."""
     red, green, blue = 0.0, 0.0, 0.0
@@ -74,7 +74,7 @@ def _pixel(surface, chains, ids, grid, j, i, side, first, sample, texel, out):
     out[0], out[1], out[2] = red * share, green * share, blue * share
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shade_part(part, parts, surface, chains, ids, grid, first_row, side, image):
     """Shade and average a part of the rows of pixels, whose first row of samples is ``first_row`` of the grid."""
     sample, texel, mean = np.empty(5), np.empty(4, np.float32), np.empty(3)

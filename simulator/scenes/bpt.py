@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.scene import Patches
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.scene import Patches
 
 POINTS_PER_PATCH = 16
 

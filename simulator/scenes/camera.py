@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
 
 FIT_FOV_DEGREES = 40.0  # vertical; a portrait lens, so that perspective shows but does not distort
 FIT_MARGIN = 1.05  # room left around a fitted model

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import TilestampError
-from simulator.scenes.camera import Camera, LookAt, ModelToClip
-from simulator.scenes.library import with_views
-from simulator.scenes.scene import Scene
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.camera import Camera, LookAt, ModelToClip
+from tilestamp.simulator.scenes.library import with_views
+from tilestamp.simulator.scenes.scene import Scene
 
 MATRIX_KEY = "model_to_clip"
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.catmull_clark_cage import check_cage, cleaned_cage, edge_sharpness
-from simulator.scenes.catmull_clark_step import limit_points, step
-from simulator.scenes.quad_cage import Cage
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.catmull_clark_cage import check_cage, cleaned_cage, edge_sharpness
+from tilestamp.simulator.scenes.catmull_clark_step import limit_points, step
+from tilestamp.simulator.scenes.quad_cage import Cage
 
 MOST_FACES = 1 << 26  # 67 million quads: beyond it memory, not patience, runs out
 

@@ -1,11 +1,11 @@
 """What a cage must be before it is subdivided: checked, cleaned of isolated vertices, wound one way, creased."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.quad_cage import Cage, Indices
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.scenes.quad_cage import Cage, Indices
 
 
 def check_cage(cage: Cage) -> None:
@@ -83,7 +83,7 @@ def _face_pairs(cage: Cage) -> Indices:
     return pairs
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _turned_faces(offsets, corner_edges, beside, forwards):
     """Flood each component from its first face: which faces to turn, and whether that contradicts itself."""
     faces = len(offsets) - 1

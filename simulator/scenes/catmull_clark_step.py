@@ -1,12 +1,13 @@
 """One Catmull-Clark step and the limit masks, as plain loops (Catmull & Clark 1978; DeRose et al. 1998 for creases)."""
 
 import numpy as np
-from numba import njit
+
+from tilestamp.models.kernel import kernel
 
 CORNER = 3  # sharp edges at a vertex from which on it is a corner and stays
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def step(positions, offsets, corners, corner_edges, edges, sharpness, cage_face):
     """Refine a surface once; takes and returns the fields of a ``Surface``."""
     vertices, faces = len(positions), len(offsets) - 1
@@ -36,7 +37,7 @@ def step(positions, offsets, corners, corner_edges, edges, sharpness, cage_face)
     return points, new_offsets, quads, quad_edges, new_edges, new_sharpness, new_faces
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _edge_points(positions, edges, sharpness, beside, points):
     """Smooth: mean of both ends and both face points; sharp: the middle; between 0 and 1: between the two."""
     for e in range(len(edges)):
@@ -51,7 +52,7 @@ def _edge_points(positions, edges, sharpness, beside, points):
                 points[len(positions) + e, d] = sharp * middle + (1.0 - sharp) * smooth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sharp_ends(positions, edges, sharpness):
     """Of each vertex: sharp edges, boundary edges, sum of their sharpness (each at most 1), sum of their far ends."""
     sharp = np.zeros((len(positions), 2), np.int32)
@@ -69,7 +70,7 @@ def _sharp_ends(positions, edges, sharpness):
     return sharp, softness, far
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _vertex_points(positions, edges, sharpness, around, count, points):
     """Smooth: (F + 2 R + (n - 3) P) / n; on a crease (1, 6, 1) / 8; at a corner P."""
     vertices = len(positions)
@@ -98,7 +99,7 @@ def _vertex_points(positions, edges, sharpness, around, count, points):
             points[v, d] = weight * held + (1.0 - weight) * smooth if crease else smooth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_faces(vertices, first_face, offsets, corners, corner_edges, edges, cage_face):
     """Make a quad of each corner: the corner, the next edge's point, the face point, the edge point before."""
     quads = np.empty(4 * len(corners), np.int32)
@@ -122,7 +123,7 @@ def _new_faces(vertices, first_face, offsets, corners, corner_edges, edges, cage
     return quads, quad_edges, faces
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_edges(vertices, first_face, offsets, corner_edges, edges, sharpness):
     """Two halves of each edge, a step less sharp, and a smooth spoke for each face corner."""
     halves = 2 * len(edges)
@@ -140,7 +141,7 @@ def _new_edges(vertices, first_face, offsets, corner_edges, edges, sharpness):
     return new_edges, new_sharpness
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def limit_points(positions, quads, edges, sharpness):
     """Limit of each vertex: (n^2 P + 4 E + F) / (n (n + 5)), on a crease (1, 4, 1) / 6, at a corner P."""
     vertices = len(positions)

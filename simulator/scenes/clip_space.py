@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.camera import ModelToClip
-from simulator.scenes.scene import Mesh, Scene
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.camera import ModelToClip
+from tilestamp.simulator.scenes.scene import Mesh, Scene
 
 
 def read_clip_space(path: str | Path) -> Mesh:

@@ -7,20 +7,20 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.approximate_catmull_clark import patches_from_cage
-from simulator.scenes.bpt import read_bpt
-from simulator.scenes.camera import Camera, fit_camera
-from simulator.scenes.clip_space import checked_mesh, clip_space_scene, read_clip_space
-from simulator.scenes.obj_file import read_obj
-from simulator.scenes.quad_cage import cage_of
-from simulator.scenes.scene import Patches, Scene
-from simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
-from simulator.scenes.subpatches import split_to_count, with_mesh
-from simulator.scenes.textured_mesh import read_gltf
-from simulator.scenes.textured_obj import read_textured_obj
-from simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
-from simulator.scenes.views import VIEWS
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
+from tilestamp.simulator.scenes.bpt import read_bpt
+from tilestamp.simulator.scenes.camera import Camera, fit_camera
+from tilestamp.simulator.scenes.clip_space import checked_mesh, clip_space_scene, read_clip_space
+from tilestamp.simulator.scenes.obj_file import read_obj
+from tilestamp.simulator.scenes.quad_cage import cage_of
+from tilestamp.simulator.scenes.scene import Patches, Scene
+from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
+from tilestamp.simulator.scenes.subpatches import split_to_count, with_mesh
+from tilestamp.simulator.scenes.textured_mesh import read_gltf
+from tilestamp.simulator.scenes.textured_obj import read_textured_obj
+from tilestamp.simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
+from tilestamp.simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 

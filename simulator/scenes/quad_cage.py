@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.obj_file import ObjFile, read_obj
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.obj_file import ObjFile, read_obj
 
 Indices = NDArray[np.int64]
 Points = NDArray[np.float64]

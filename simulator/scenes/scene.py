@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.camera import Camera
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.camera import Camera
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,14 @@ class Scene:
 
         Raises TilestampError where positions are not finite, triangles name vertices that do not exist, or are none.
         """
-        from simulator.scenes.clip_space import clip_space_mesh, clip_space_scene
+        from tilestamp.simulator.scenes.clip_space import clip_space_mesh, clip_space_scene
 
         return clip_space_scene(clip_space_mesh(positions, triangles, name), name)
 
     @classmethod
     def sweep(cls, area: float, width: int = 1024, height: int = 768, seed: int = 0) -> "Scene":
         """Make the synthetic triangles of one area, in pixels, of Figure 5 (Laine & Karras 2011); see `sweep`."""
-        from simulator.scenes.clip_space import clip_space_scene
-        from simulator.scenes.sweep import sweep_mesh
+        from tilestamp.simulator.scenes.clip_space import clip_space_scene
+        from tilestamp.simulator.scenes.sweep import sweep_mesh
 
         return clip_space_scene(sweep_mesh(area, width, height, seed), f"sweep {area:g} px")

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
 
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
 LEVELS = 2  # of sub-folders that are looked into

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.scene import Mesh, Patches, Scene
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.scene import Mesh, Patches, Scene
 
 # De Casteljau at one half: the control points of the first half of a cubic; the second half is its mirror image.
 FIRST_HALF = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0

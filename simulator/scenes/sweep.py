@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.scene import Mesh
-from simulator.scenes.xorshift import AUTHORS_SEED, draw_floats, random_state
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.scene import Mesh
+from tilestamp.simulator.scenes.xorshift import AUTHORS_SEED, draw_floats, random_state
 
 TARGET_TRIANGLES = 1 << 20
 PATCH_QUADS = 8  # a patch is 8x8 quads, 9x9 vertices

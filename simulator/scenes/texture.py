@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from tilestamp.models.kernel import kernel
 
 TEXEL_BYTES = 4
 TILE = 4  # texels on a side of a storage tile, by default: 64 bytes
@@ -91,7 +92,7 @@ def _stored(level: NDArray[np.float32], tile: int) -> NDArray[np.float32]:
     return padded.reshape(rows, tile, columns, tile, 4).swapaxes(1, 2).reshape(-1, 4)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
     """Where texel (x, y) of a level lies, in texels; x and y wrap."""
     first = chains.levels[texture, level, 0]
@@ -105,7 +106,7 @@ def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
     return first + tile * side * side + (y % side) * side + x % side
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nearest(chains: Any, texture: int, u: Any, v: Any, out: Any) -> None:
     """Write the RGBA of the texel that (u, v) falls into, level 0, to ``out``."""
     x = int(np.floor(u * np.float32(chains.levels[texture, 0, 1])))
@@ -115,7 +116,7 @@ def nearest(chains: Any, texture: int, u: Any, v: Any, out: Any) -> None:
         out[c] = chains.texels[i, c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def footprint(chains: Any, texture: int, level: int, u: Any, v: Any) -> tuple[int, int, Any, Any]:
     """Lower left texel of the 2x2 texels around (u, v), and the weights of the right and upper ones."""
     s = u * np.float32(chains.levels[texture, level, 1]) - _HALF
@@ -125,7 +126,7 @@ def footprint(chains: Any, texture: int, level: int, u: Any, v: Any) -> tuple[in
     return int(x), int(y), s - x, t - y
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def add_bilinear(chains: Any, texture: int, level: int, u: Any, v: Any, weight: Any, out: Any) -> None:
     """Add ``weight`` times the bilinear value at (u, v) of one level to ``out``."""
     x, y, fx, fy = footprint(chains, texture, level, u, v)
@@ -138,7 +139,7 @@ def add_bilinear(chains: Any, texture: int, level: int, u: Any, v: Any, weight: 
                 out[c] += w * chains.texels[i, c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def level_of_detail(chains: Any, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
     """Automatic level: log2 of the longer of the two texel-space derivatives, in [0, last level]."""
     width = np.float32(chains.levels[texture, 0, 1])
@@ -151,7 +152,7 @@ def level_of_detail(chains: Any, texture: int, dudx: Any, dvdx: Any, dudy: Any, 
     return min(_HALF * np.log2(longest), np.float32(chains.counts[texture] - 1))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def add_trilinear(chains: Any, texture: int, lod: Any, u: Any, v: Any, out: Any) -> None:
     """Add the trilinear value at (u, v): two levels around ``lod``, blended by its fraction."""
     low = int(lod)

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.gltf_file import TRIANGLES, GltfFile
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.subpatches import with_mesh
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.gltf_file import TRIANGLES, GltfFile
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.subpatches import with_mesh
 
 
 class Geometry(NamedTuple):

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.gltf_file import read_image
-from simulator.scenes.scene import Mesh
-from simulator.scenes.textured_mesh import vertex_normals
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.gltf_file import read_image
+from tilestamp.simulator.scenes.scene import Mesh
+from tilestamp.simulator.scenes.textured_mesh import vertex_normals
 
 
 def is_textured(path: Path) -> bool:

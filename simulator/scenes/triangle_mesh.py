@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes.clip_space import finite_positions, vertex_numbers
-from simulator.scenes.obj_file import WHITE, ObjFile
-from simulator.scenes.scene import Mesh
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.clip_space import finite_positions, vertex_numbers
+from tilestamp.simulator.scenes.obj_file import WHITE, ObjFile
+from tilestamp.simulator.scenes.scene import Mesh
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simulator.scenes.camera import LookAt
+from tilestamp.simulator.scenes.camera import LookAt
 
 FOV_DEGREES = 45.0  # vertical; assumed
 NEAR, FAR = 0.25, 100.0  # model units; assumed

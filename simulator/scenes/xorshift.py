@@ -4,8 +4,9 @@ Specification: notes on Laine & Karras 2011, section 8. Draw n is rotl32(x[n-11]
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from tilestamp.models.kernel import kernel
 
 WORDS = 11  # words of state, then one more: the place of the next draw
 SHORT_LAG_PLACE = 7
@@ -13,7 +14,7 @@ AUTHORS_SEED = 123
 MASK = np.uint64(0xFFFFFFFF)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw(state: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> None:
     """Fill ``numbers`` with the next draws, in place."""
     place = state[WORDS]

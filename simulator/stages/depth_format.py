@@ -3,9 +3,9 @@
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.exact import float_bits
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import float_bits
 
 DepthFormat = Literal["fixed16", "fixed24", "fixed32", "float32"]
 _F0, _F1 = np.float32(0), np.float32(1)
@@ -27,7 +27,7 @@ DEPTHS = {
 }
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def stored_depth(z, scale):
     """NDC depth as it is kept, 0 nearest; larger is farther in every format."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)

@@ -10,15 +10,15 @@ and kept in one of the formats of graphics interfaces: 16, 24 or 32 bits of fixe
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from simulator.parallel import for_parts
-from simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
-from simulator.stages.liu2010.freepipe_triangle import Pieces, _start_edges, make_pieces
-from simulator.work import FixedFunctionWork
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import Pieces, _start_edges, make_pieces
+from tilestamp.simulator.work import FixedFunctionWork
 
 SUBPIXEL_BITS = 8
 MAX_SIDE = 16384  # pixels, the limit of Direct3D 11 hardware
@@ -34,7 +34,7 @@ class HardwareFrame(NamedTuple):
     depth: NDArray[np.uint32]  # (H, W) units of the format, or bits of a float; the farthest where there is none
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _quad(pieces, p, t, edge, x, y, corner, rows, bits, scale, ids, depth, counts):
     """Test the four pixels of one quad, whose lower-left pixel is (x, y); draw those of the strip's rows."""
     tests = 0
@@ -58,7 +58,7 @@ def _quad(pieces, p, t, edge, x, y, corner, rows, bits, scale, ids, depth, count
     counts[Z_TESTS] += tests
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_strip(part, parts, pieces, bits, scale, cull, ids, depth, counts):
     """Draw all triangles, in order, to the rows of a strip, which begins at an even one."""
     pairs = (ids.shape[0] + 1) // 2

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.coalescing import transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.work import Work
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.work import Work
 
 
 class ThreadEvent(IntEnum):

@@ -3,20 +3,20 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.parallel import for_parts, parts_of
-from simulator.scenes.scene import Mesh, Scene
-from simulator.scenes.subpatches import with_mesh
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.subpatches import with_mesh
 
 ALPHA = np.float32(0.5)  # of colours made here, as in the published benchmarks
 AMBIENT = np.float32(0.2)
 _PART_VERTICES = 4096  # at least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _transform_part(part: int, parts: int, positions: Any, matrix: Any, out: Any) -> None:
     for v in range(positions.shape[0] * part // parts, positions.shape[0] * (part + 1) // parts):
         for c in range(4):
@@ -26,7 +26,7 @@ def _transform_part(part: int, parts: int, positions: Any, matrix: Any, out: Any
             out[v, c] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_normals(positions: Any, triangles: Any, normals: Any) -> None:
     """Add each triangle's normal, as long as its area, to its vertices."""
     for t in range(triangles.shape[0]):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.simt import Simt
-from simulator.pipelines.cudaraster import cudaraster
-from simulator.scenes.scene import Mesh, Scene
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.pipelines.cudaraster import cudaraster
+from tilestamp.simulator.scenes.scene import Mesh, Scene
 
 
 def sphere(triangles):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from experiments.ste.setting import cube
-from simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import sample_positions
-from simulator.stages.fatahalian2009.stamps import stamp_shape
-from simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.experiments.ste.setting import cube
+from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
+from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 MICROQUADS = 4_000_000
 WIDTH, HEIGHT = 1600, 1200
@@ -35,7 +35,7 @@ def test_subdivide_a_cube_seven_times(benchmark):
 
 
 def test_subdivide_bigguy_to_sub_pixel_size(benchmark, shared):
-    from simulator.scenes.quad_cage import read_cage
+    from tilestamp.simulator.scenes.quad_cage import read_cage
 
     surface = surface_of(read_cage(shared / "scenes" / "cages" / "bigguy.obj"))
     benchmark(lambda: limit_positions(subdivide(surface, 5)))

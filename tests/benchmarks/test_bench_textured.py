@@ -2,11 +2,11 @@
 
 import pytest
 
-from models.machine import load_machine
-from simulator.pipelines.binned import binned
-from simulator.pipelines.per_primitive import per_primitive
-from simulator.pipelines.tiled import tiled
-from simulator.scenes.library import load_scene
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.pipelines.binned import binned
+from tilestamp.simulator.pipelines.per_primitive import per_primitive
+from tilestamp.simulator.pipelines.tiled import tiled
+from tilestamp.simulator.scenes.library import load_scene
 
 pytestmark = pytest.mark.benchmark(group="textured")
 

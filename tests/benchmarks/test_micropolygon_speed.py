@@ -5,14 +5,14 @@ from functools import cache
 
 import pytest
 
-from models.errors import TilestampError
-from models.simt import AtomicMerge, Coalescing, Simt
-from simulator.pipelines.micropolygon import micropolygon
-from simulator.scenes import load_scene, read_camera
-from simulator.stages.eisenacher2010.bound_and_split import bound_and_split
-from simulator.stages.eisenacher2010.bucket_count import bucket_count
-from simulator.stages.eisenacher2010.dice import dice
-from simulator.stages.eisenacher2010.tile_range import screen_tiles
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.pipelines.micropolygon import micropolygon
+from tilestamp.simulator.scenes import load_scene, read_camera
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
+from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 SIZE = (1600, 1200)

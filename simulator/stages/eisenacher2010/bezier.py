@@ -9,10 +9,10 @@ operations in the same order as one alone would.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
 
 LANES = 16  # sub-patches side by side
 POINTS = 16  # control points of a patch, vertices of a grid
@@ -30,7 +30,7 @@ class Squares(NamedTuple):
     side: NDArray[np.float32]  # a power of two, so that the ends of the unit interval are exact
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_squares(lanes: Any) -> Any:
     """Scratch for sub-patches."""
     return Squares(
@@ -38,7 +38,7 @@ def new_squares(lanes: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
     """Put sub-patch ``n`` of the queue in a lane."""
     squares.patch[lane] = queue.patch[n]
@@ -46,7 +46,7 @@ def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
     squares.side[lane] = ONE / np.float32(1 << queue.level[n])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(points: Any, patch: Any, net: Any) -> Any:
     """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
     for lane in range(LANES):
@@ -56,7 +56,7 @@ def gather(points: Any, patch: Any, net: Any) -> Any:
                 net[(POINTS * d + k) * LANES + lane] = points[p, d, k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def restriction(first: Any, side: Any, rows: Any) -> Any:
     """Tables of the intervals [a, b] = [first * side, (first + 1) * side] by blossoms.
 
@@ -73,12 +73,12 @@ def restriction(first: Any, side: Any, rows: Any) -> Any:
         rows[3 * LANES + n], rows[7 * LANES + n], rows[11 * LANES + n], rows[15 * LANES + n] = _bernstein(b, B)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _bernstein(a: Any, A: Any) -> Any:
     return A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
     """Bernstein polynomials at four evenly spaced parameters of the intervals [first * side, (first + 1) * side].
 
@@ -108,7 +108,7 @@ def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
             )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     return (
         w[(0 + k) * LANES + n] * p0
@@ -118,12 +118,12 @@ def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _weigh_steps(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     return w[(0 + k) * LANES + n] * (p1 - p0) + w[(4 + k) * LANES + n] * (p2 - p1) + w[(8 + k) * LANES + n] * (p3 - p2)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
     """Contract the rows of coordinate d of a net: ``between[r, x]``."""
     for x in range(4):
@@ -136,7 +136,7 @@ def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
             between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
     """Contract the columns: ``out[d, 4 r + c]``."""
     for r in range(4):
@@ -149,7 +149,7 @@ def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
             out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
     """Tensor product: control points of sub-patches by ``restriction`` tables, points of grids by ``basis`` tables.
 
@@ -167,7 +167,7 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
         _along_u(between, by_u, out, d)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
     """Contract the differences of neighbouring columns."""
     for r in range(4):
@@ -180,7 +180,7 @@ def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
             out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
     """Contract the differences of neighbouring rows."""
     for x in range(4):
@@ -193,7 +193,7 @@ def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
             between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def evaluate(
     net: Any, by_u: Any, by_v: Any, slope_u: Any, slope_v: Any, between: Any, out: Any, along_u: Any, along_v: Any
 ) -> Any:
@@ -209,7 +209,7 @@ def evaluate(
         _along_u(between, by_u, along_v, d)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> Any:
     """Point of lane ``n`` at (u, v), and thirds of its derivatives along u and v: ``values[d]``, as ``evaluate``."""
     U, V = ONE - u, ONE - v

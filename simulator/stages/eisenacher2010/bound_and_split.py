@@ -18,18 +18,18 @@ all models and never for a cell:
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.sampler import Sampler
-from simulator.stages.eisenacher2010.bezier import LANES, screen_points
-from simulator.stages.eisenacher2010.bucket_scan import bucket_scan
-from simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
-from simulator.stages.eisenacher2010.split_counts import pass_works, scan_works, transform_work
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.stages.eisenacher2010.bezier import LANES, screen_points
+from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
+from tilestamp.simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
+from tilestamp.simulator.stages.eisenacher2010.split_counts import pass_works, scan_works, transform_work
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads, a sub-patch each
 GRID_SIDE = 4  # control points
@@ -55,7 +55,7 @@ class SubPatches(NamedTuple):
     passes: NDArray[np.int64]  # (passes, 5)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _subdivide(
     part: Any, parts: Any, queue: Any, path: Any, boxes: Any, places: Any, target: Any, target_path: Any, moved: Any
 ) -> Any:

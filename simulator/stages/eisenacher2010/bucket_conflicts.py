@@ -7,11 +7,11 @@ make them cheap, because neighbours in the patch queue want the same few tiles.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.atomics import CHUNK_BYTES
-from models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.models.atomics import CHUNK_BYTES
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 
 WORD_BYTES = 4  # a counter
 CHUNK_WORDS = CHUNK_BYTES // WORD_BYTES
@@ -45,7 +45,7 @@ def atomic_rule(simt: Simt, padding: int) -> AtomicRule:
     return AtomicRule(simt.warp, min(HALF_WARP, simt.warp) if half else simt.warp, int(simt.atomic_merge), padding)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scratch(lanes):
     """Make the lists for one warp."""
     return Wanted(
@@ -58,7 +58,7 @@ def scratch(lanes):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def keep_leaders(tile, lanes, leaders):
     """Copy only the first lane of each tile: it adds for the others (warp aggregation)."""
     for lane in range(lanes):
@@ -69,7 +69,7 @@ def keep_leaders(tile, lanes, leaders):
                 break
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find(values, found, value, guess):
     """Index of ``value``, or ``found``; a good guess saves the search."""
     if guess < found and values[guess] == value:
@@ -80,7 +80,7 @@ def _find(values, found, value, guess):
     return k
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def list_wanted(tile, start, stop, padding, wanted):
     """List what the lanes start..stop-1 want.
 
@@ -115,7 +115,7 @@ def list_wanted(tile, start, stop, padding, wanted):
     return tiles, chunks, depth, chunk_depth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def send_requests(wanted, chunks, merge, table):
     """Count the requests that leave the SM, every lane or what a merged chunk needs; add them to ``table`` by chunk."""
     total = 0

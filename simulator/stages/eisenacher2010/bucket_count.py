@@ -12,23 +12,24 @@ all lanes of a warp that want the same tile.
 from enum import IntEnum
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import get_num_threads
 from numpy.typing import NDArray
 
-from models.atomics import CHUNK_BYTES
-from models.coalescing import contiguous, transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts
-from simulator.stages.eisenacher2010.bucket_conflicts import (
+from tilestamp.models.atomics import CHUNK_BYTES
+from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import (
     atomic_rule,
     keep_leaders,
     list_wanted,
     scratch,
     send_requests,
 )
-from simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles
-from simulator.work import Work
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads: one a patch
 WORD_BYTES = 4
@@ -69,7 +70,7 @@ class BucketCountEvent(IntEnum):
 _E = BucketCountEvent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _place(slots, count, idx):
     """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
     patches = idx.shape[0]
@@ -84,7 +85,7 @@ def _place(slots, count, idx):
                     count[tile] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_atomic(tile, lanes, rule, aggregate, wanted, row, chunk_requests, leaders):
     """Events of one slot in one warp."""
     active = active_lanes(tile, lanes)
@@ -114,7 +115,7 @@ def _count_atomic(tile, lanes, rule, aggregate, wanted, row, chunk_requests, lea
     row[_E.ATOMIC_SECTORS] += chunks
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def active_lanes(tile, lanes):
     """Lanes whose slot holds a tile."""
     active = 0
@@ -123,7 +124,7 @@ def active_lanes(tile, lanes):
     return active
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
     """Load of the boxes and store of IDX by one warp: transactions and bytes of each.
 
@@ -142,7 +143,7 @@ def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
     return loads, load_bytes, stores, store_bytes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests):
     """Tiles of all lanes and slots in the blocks of one part, and their events; a row of ``requests`` a part."""
     patches = boxes.shape[0]

@@ -11,11 +11,11 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from models.coalescing import contiguous
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.work import Work
+from tilestamp.models.coalescing import contiguous
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 ELEMENTS = 1024  # counters a block: a vector of four a thread

@@ -6,16 +6,22 @@ One thread a patch again: for each tile that the patch overlaps, ``LISTS[START[t
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.eisenacher2010.bucket_count import BLOCK, BOX_BYTES, WORD_BYTES, active_lanes, patch_traffic
-from simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
-from simulator.work import Work
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import (
+    BLOCK,
+    BOX_BYTES,
+    WORD_BYTES,
+    active_lanes,
+    patch_traffic,
+)
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
+from tilestamp.simulator.work import Work
 
 
 class BucketWriteEvent(IntEnum):
@@ -40,7 +46,7 @@ class BucketWriteEvent(IntEnum):
 _E = BucketWriteEvent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write(boxes, tiles, start, idx, lists):
     """Fill LISTS."""
     for p in range(boxes.shape[0]):
@@ -50,7 +56,7 @@ def _write(boxes, tiles, start, idx, lists):
                 lists[start[y * tiles.columns + x] + idx[p, (y - y0) * tiles.slots + x - x0]] = p
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row):
     """Count loads of START and stores to LISTS of one slot in one warp, at their real addresses."""
     active = active_lanes(tile, lanes)
@@ -76,7 +82,7 @@ def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row
     row[_E.STORE_BYTES] += size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_blocks(part, parts, boxes, tiles, warp, start, idx, coalescing, table):
     """Events of the blocks of one part."""
     patches, blocks = boxes.shape[0], table.shape[0]

@@ -11,14 +11,14 @@ fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.eisenacher2010 import shading
-from simulator.stages.eisenacher2010.bezier import (
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.eisenacher2010 import shading
+from tilestamp.simulator.stages.eisenacher2010.bezier import (
     LANES,
     basis,
     evaluate,
@@ -29,9 +29,9 @@ from simulator.stages.eisenacher2010.bezier import (
     screen_points,
     set_square,
 )
-from simulator.stages.eisenacher2010.bound_and_split import SubPatches
-from simulator.stages.eisenacher2010.dice_counts import BLOCK, VERTICES, dice_work
-from simulator.stages.eisenacher2010.shading import (
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
+from tilestamp.simulator.stages.eisenacher2010.dice_counts import BLOCK, VERTICES, dice_work
+from tilestamp.simulator.stages.eisenacher2010.shading import (
     MATT,
     NORMAL,
     NUDGE,
@@ -42,7 +42,7 @@ from simulator.stages.eisenacher2010.shading import (
     shade,
     tangent,
 )
-from simulator.work import Work
+from tilestamp.simulator.work import Work
 
 GRID_SIDE = 4  # vertices
 
@@ -54,7 +54,7 @@ class Grids(NamedTuple):
     boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the 16 vertices
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
     """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
     middle = np.float32(0.5)
@@ -75,7 +75,7 @@ def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
             grid.rows[NORMAL + 2 * shading.VERTICES + at] = ux * vy - uy * vx
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, boxes: Any) -> Any:
     """Write the vertices of each lane, and bound them."""
     screen = grid.screen
@@ -92,7 +92,7 @@ def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, 
         boxes[first + n, 0], boxes[first + n, 1], boxes[first + n, 2], boxes[first + n, 3] = x0, y0, x1, y1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _project(s: Any) -> Any:
     """Divide the screen rows of all vertices by w."""
     for k in range(shading.VERTICES):
@@ -102,7 +102,7 @@ def _project(s: Any) -> Any:
         s[3 * shading.VERTICES + k] *= scale
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _dice(
     part: Any,
     parts: Any,

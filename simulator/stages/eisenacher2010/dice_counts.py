@@ -5,10 +5,10 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from models.coalescing import transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.work import Work
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads, a vertex each: 16 sub-patches
 VERTICES = 16  # of a grid

@@ -11,10 +11,18 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.eisenacher2010.bezier import LANES, POINTS, gather, new_squares, restrict, restriction, set_square
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.eisenacher2010.bezier import (
+    LANES,
+    POINTS,
+    gather,
+    new_squares,
+    restrict,
+    restriction,
+    set_square,
+)
 
 
 class Path(IntEnum):
@@ -48,7 +56,7 @@ _OFF_SCREEN = np.int32(31)  # bits: the four sides of the screen, and w <= near
 _ROW = POINTS * LANES  # a coordinate of all points
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_scratch(side: Any, lanes: Any) -> Any:
     return _Scratch(
         np.empty(4 * side * lanes, np.float32),
@@ -62,7 +70,7 @@ def _new_scratch(side: Any, lanes: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any) -> Any:
     """Whether a box satisfies the bound."""
     if whole_pixels:
@@ -70,7 +78,7 @@ def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any)
     return x1 - x0 < bound and y1 - y0 < bound
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _measure(s: Any, width: Any, height: Any, near: Any) -> Any:
     """Sides of the frustum and boxes of all lanes; a box means nothing where a point lies behind the eye."""
     net, box = s.net, s.box
@@ -93,7 +101,7 @@ def _measure(s: Any, width: Any, height: Any, near: Any) -> Any:
             box[2, n], box[3, n] = max(box[2, n], x), max(box[3, n], y)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
     """What was found about lane ``n``."""
     if s.everywhere[n] & _OFF_SCREEN:
@@ -103,7 +111,7 @@ def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
     return KEEP if _is_small(s.box[0, n], s.box[1, n], s.box[2, n], s.box[3, n], bound, whole_pixels) else SPLIT
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _store_box(s: Any, n: Any, out: Any) -> Any:
     """Box x0, y0, x1, y1 of lane ``n``, and half the cross product of the diagonals between its corners."""
     out[0], out[1], out[2], out[3] = s.box[0, n], s.box[1, n], s.box[2, n], s.box[3, n]
@@ -114,7 +122,7 @@ def _store_box(s: Any, n: Any, out: Any) -> Any:
     out[4] = np.float32(0.5) * abs(x0 * y1 - x1 * y0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def examine(
     part: Any,
     parts: Any,

@@ -8,10 +8,10 @@ sub-patch, lies in the tile foretells the samples that are tested and hit there.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.eisenacher2010.tile_range import Tiles
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 
 MARGIN = np.float32(1 / 64)  # pixels: rounding of a diced vertex beyond the control points
 
@@ -25,7 +25,7 @@ class TileSizes(NamedTuple):
     meets: NDArray[np.uint8]  # (N,) tiles that each box meets
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _range(box: Any, tiles: Any) -> Any:
     """First and last tile column and row that a box meets."""
     size = np.float32(tiles.size)
@@ -36,7 +36,7 @@ def _range(box: Any, tiles: Any) -> Any:
     return x0, y0, x1, y1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _spread(boxes: Any, tiles: Any, number: Any, area: Any, box_area: Any, meets: Any) -> None:
     """Deal each box to the tiles that it meets."""
     for k in range(boxes.shape[0]):
@@ -56,7 +56,7 @@ def _spread(boxes: Any, tiles: Any, number: Any, area: Any, box_area: Any, meets
                 box_area[tile] += inside
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _meeting(boxes: Any, tiles: Any, wanted: Any, found: Any) -> Any:
     """List the boxes that meet a wanted tile, in order."""
     n = 0

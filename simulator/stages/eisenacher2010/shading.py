@@ -7,10 +7,10 @@ The lamp hangs above the viewer's left shoulder and is infinitely far away; surf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from simulator.stages.eisenacher2010.bezier import LANES
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.eisenacher2010.bezier import LANES
 
 AMBIENT = np.float32(0.15)
 DIFFUSE = np.float32(0.75)
@@ -57,7 +57,7 @@ class Grid(NamedTuple):
     along_v: NDArray[np.float32]  # (4, 16, LANES)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_grid(side: Any, lanes: Any) -> Any:
     """Scratch for grids; w = 1 until a patch with weights writes it."""
     rows = np.zeros(ROWS, np.float32)
@@ -103,7 +103,7 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def set_normals(s: Any) -> Any:
     """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
     missing = 0
@@ -129,7 +129,7 @@ def set_normals(s: Any) -> Any:
     return missing
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tangent(values: Any, along: Any) -> Any:
     """Tangent of x/w, y/w, z/w up to a positive factor, from a point and its derivatives, a coordinate a row."""
     w, dw = values[3, 0], values[3, along]
@@ -140,7 +140,7 @@ def tangent(values: Any, along: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> Any:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
@@ -169,7 +169,7 @@ def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew:
         s[GLOSS + k] = SPECULAR * mirrored
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _set_checker(s: Any, squares: Any) -> Any:
     """Reflectances of a solid checker."""
     for k in range(VERTICES):
@@ -182,7 +182,7 @@ def _set_checker(s: Any, squares: Any) -> Any:
         s[COLOR + 2 * VERTICES + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _set_texels(s: Any, texture: Any, squares: Any) -> Any:
     """Reflectances from the texels at (u, v) of the patch, v down the rows."""
     for at in range(VERTICES):
@@ -195,7 +195,7 @@ def _set_texels(s: Any, texture: Any, squares: Any) -> Any:
             s[COLOR + VERTICES * channel + at] = np.float32(texture[row, column, channel]) / _BYTE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _set_colors(s: Any) -> Any:
     """Light the reflectances: levels from 0 to 255."""
     for channel in range(3):
@@ -204,7 +204,7 @@ def _set_colors(s: Any) -> Any:
             s[COLOR + channel * VERTICES + k] = min(level, _ONE) * _BYTE + _HALF
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def shade(grid: Any, light: Any, texture: Any, squares: Any) -> Any:
     """Set the colours of grids with normals: three rows of levels, to be cut to whole numbers."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
@@ -216,7 +216,7 @@ def shade(grid: Any, light: Any, texture: Any, squares: Any) -> Any:
     _set_colors(s)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def packed_color(s: Any, k: Any) -> Any:
     """RGBA8 of a shaded vertex, red lowest."""
     red, green, blue = s[COLOR + k], s[COLOR + VERTICES + k], s[COLOR + 2 * VERTICES + k]

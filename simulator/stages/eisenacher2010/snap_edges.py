@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.stages.eisenacher2010.bound_and_split import SubPatches
-from simulator.stages.eisenacher2010.dice import Grids
-from simulator.stages.eisenacher2010.dice_counts import dice_work
-from simulator.work import Work
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
+from tilestamp.simulator.stages.eisenacher2010.dice import Grids
+from tilestamp.simulator.stages.eisenacher2010.dice_counts import dice_work
+from tilestamp.simulator.work import Work
 
 _I64 = NDArray[np.int64]
 EDGES = np.array([[0, 1, 2, 3], [12, 13, 14, 15], [0, 4, 8, 12], [3, 7, 11, 15]])  # points by edge: v 0, v 1, u 0, u 1

@@ -11,15 +11,15 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import contiguous, transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.sampler import Sampler
-from simulator.work import Work
+from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.work import Work
 
 STAGE = "bound_and_split"
 SAMPLED_QUEUE = 2**17  # sub-patches of a pass from which on a sampler counts part of its blocks
@@ -82,7 +82,7 @@ _S = SubdivideEvent
 _T = TransformEvent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_oracle_warp(first: Any, lanes: Any, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any) -> Any:
     """Events of one warp of the oracle."""
     boxes = 0
@@ -113,7 +113,7 @@ def _count_oracle_warp(first: Any, lanes: Any, patch: Any, path: Any, coalescing
     row[_O.STORE_BYTES] += size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_subdivide_warp(
     first: Any, lanes: Any, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
 ) -> Any:
@@ -147,7 +147,7 @@ def _count_subdivide_warp(
         row[_S.STORE_BYTES] += size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_blocks(
     part: Any, parts: Any, patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any
 ) -> Any:

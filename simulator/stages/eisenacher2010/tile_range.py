@@ -7,9 +7,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
 
 TILE_SIZES = (4, 8, 16, 32)  # pixels a side
 
@@ -57,7 +57,7 @@ def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
     return Tiles(tile, -(-width // tile), -(-height // tile), max(2, math.ceil(bound / tile) + 1))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tile_range(box, tiles):
     """First and last tile column and row that the box x0, y0, x1, y1 overlaps; last < first where it is off screen."""
     scale = np.float32(1) / np.float32(tiles.size)
@@ -71,7 +71,7 @@ def tile_range(box, tiles):
     return x0, y0, x1, y1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def slot_tiles(boxes, first, lanes, tiles, slots):
     """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes)."""
     for lane in range(lanes):

@@ -12,15 +12,15 @@ outside a quad's box are charged for the edge functions and taken as misses.
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.eisenacher2010.tile_range import Tiles
-from simulator.stages.eisenacher2010.tile_raster_events import (
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     EDGE_VECTORS,
     VECTOR_BYTES,
     VERTICES,
@@ -33,8 +33,8 @@ from simulator.stages.eisenacher2010.tile_raster_events import (
     count_block,
     count_stores,
 )
-from simulator.stages.eisenacher2010.tile_raster_resolve import resolve
-from simulator.stages.eisenacher2010.tile_raster_samples import (
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
     FAR,
     QUADS,
@@ -43,7 +43,7 @@ from simulator.stages.eisenacher2010.tile_raster_samples import (
     sample_quad,
     sample_span,
 )
-from simulator.work import Work
+from tilestamp.simulator.work import Work
 
 SAMPLES_A_PIXEL = (1, 4, 16)
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
@@ -54,7 +54,7 @@ _HIT_WARPS = int(_E.HIT_WARPS)
 _Z_WARPS = int(_E.Z_WARPS)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
@@ -82,7 +82,7 @@ def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
                 sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, _HIT_WARPS, _Z_WARPS)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _raster_tiles(
     part, parts, drawn, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
 ):

@@ -8,14 +8,14 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.banks import bank_passes
-from models.coalescing import contiguous, transactions
-from models.simt import Coalescing, Simt
-from simulator.stages.eisenacher2010.tile_raster_resolve import resolve_replays
-from simulator.stages.eisenacher2010.tile_raster_samples import QUADS
+from tilestamp.models.banks import bank_passes
+from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve_replays
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import QUADS
 
 VERTICES = 16  # a grid
 VECTOR_BYTES = 16  # a vertex; and the width of a load
@@ -129,7 +129,7 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def box_warps(span, shape):
     """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
     mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
@@ -139,7 +139,7 @@ def box_warps(span, shape):
     return (last_row - first_row + 1) * (((span[1] & mask) >> bits) - ((span[0] & mask) >> bits) + 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_block(block, lists, first, grids, shape, traffic, row):
     """Add the events that depend on the length of the list only, and the memory traffic of loads."""
     threads = shape.tile * shape.tile
@@ -181,7 +181,7 @@ def count_block(block, lists, first, grids, shape, traffic, row):
         row[_E.BARRIERS] += 2 * shape.warps
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_loads(block, lists, first, grids, shape, traffic, row):
     """COUNT by every warp, START if there are grids; then an index for 16 lanes, a grid and its edges by the same."""
     together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // VERTICES)  # grids an instruction
@@ -211,7 +211,7 @@ def _count_loads(block, lists, first, grids, shape, traffic, row):
     row[_E.LOAD_BYTES] += grids * traffic.grid_bytes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_stores(x0, y0, width, height, shape, addresses, row):
     """Colour of each pixel on the screen, and depth where there is one sample a pixel."""
     threads = shape.tile * shape.tile

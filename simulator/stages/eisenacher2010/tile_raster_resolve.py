@@ -5,12 +5,12 @@ Threads of a block draw the tile sub-tile by sub-tile, neighbouring threads at n
 """
 
 import numpy as np
-from numba import njit
 
-from models.banks import bank_passes
+from tilestamp.models.banks import bank_passes
+from tilestamp.models.kernel import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def resolve(samples, side, x0, y0, image, depth, overdraw):
     """Write the pixels of one tile that lie on the screen: mean colour, rounded; nearest depth; hits of all samples."""
     height, width = depth.shape
@@ -35,7 +35,7 @@ def resolve(samples, side, x0, y0, image, depth, overdraw):
                 overdraw[y, x] = hits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def resolve_replays(tile, side, warp, banks, bank_lanes):
     """Further passes of one block's shared stores and loads in the resolve, from the words that each lane touches."""
     replays = 0

@@ -7,8 +7,9 @@ quad is interpolated is ours: as two triangles, split by the diagonal from the f
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from tilestamp.models.kernel import kernel
 
 GRID_SIDE = 4  # vertices
 QUADS = 9  # a grid
@@ -27,13 +28,13 @@ class Samples(NamedTuple):
     hits: NDArray[np.int32]  # covered quads so far
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def edge(ax, ay, bx, by, x, y):
     """Evaluate the edge function of a to b: twice the area of a, b and the sample."""
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend(a, b, c, u, v, w):
     """Interpolate three packed colours; weights add up to one."""
     packed = BACKGROUND & np.uint32(0xFF000000)
@@ -44,7 +45,7 @@ def blend(a, b, c, u, v, w):
     return packed
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def quad_box(vertices, grid, v):
     """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``."""
     ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, v + 1, 0], vertices[grid, v + 5, 0], vertices[grid, v + 4, 0]
@@ -54,7 +55,7 @@ def quad_box(vertices, grid, v):
     return x0, y0, x1, y1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sample_span(low, high, origin, side, samples):
     """First and last sample inside low..high on an axis of ``samples`` that starts at ``origin``, ``side`` a pixel.
 
@@ -65,7 +66,7 @@ def sample_span(low, high, origin, side, samples):
     return int(min(max(first, 0.0), samples)), int(max(min(last, samples - 1.0), -1.0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hit, passed):
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 

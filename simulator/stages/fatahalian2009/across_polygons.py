@@ -13,16 +13,22 @@ from enum import IntEnum
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
-from models.coalescing import contiguous
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, count_hits, keep_nearest, pixel_box
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.work import Work
+from tilestamp.models.coalescing import contiguous
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    blocks,
+    count_hits,
+    keep_nearest,
+    pixel_box,
+)
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.work import Work
 
 Packing = Literal["in-order", "sorted", "repacked"]
 PACKINGS = ("in-order", "sorted", "repacked")
@@ -100,7 +106,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _across_polygons(vertices, samples, sort, idle_to_refill, simt, table):
     lanes = (
         np.zeros((simt.warp, 6, 4), np.int64),  # edges
@@ -137,7 +143,7 @@ def _across_polygons(vertices, samples, sort, idle_to_refill, simt, table):
             _step(samples, lanes, simt, row, addresses)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _box_sizes(vertices, first, last, samples, lanes, sizes):
     """Count the samples in the box of each polygon: the keys of the sort."""
     for p in range(first, last):
@@ -146,7 +152,7 @@ def _box_sizes(vertices, first, last, samples, lanes, sizes):
         sizes[p - first] = max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _refill(vertices, order, taken, samples, lanes, row):
     """Give each idle lane the next polygon and set it up; returns how many have been taken."""
     edges, boxes, depths, snapped, walk, polygon = lanes
@@ -165,7 +171,7 @@ def _refill(vertices, order, taken, samples, lanes, row):
     return taken
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _step(samples, lanes, simt, row, addresses):
     """Each lane that has a polygon tests the next sample of its box."""
     edges, _, depths, _, walk, polygon = lanes

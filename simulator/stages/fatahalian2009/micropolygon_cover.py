@@ -6,9 +6,9 @@ mesh of quads has no gap and no doubly covered sample. One evaluation of a polyg
 """
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 
 STEP = SUBPIXELS  # sub-pixel steps a pixel
 STEP_BITS = SUBPIXELS.bit_length() - 1
@@ -16,7 +16,7 @@ EDGE_ROWS = 6  # three edges of each of two triangles
 BOXES = 3  # box of the polygon, then of each triangle
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_setup():
     """Scratch of ``set_up``: edges (6, 4), boxes (3, 4), depths (2, 3), and the snapped vertices (4, 2)."""
     return (
@@ -27,7 +27,7 @@ def new_setup():
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_up(polygon, edges, boxes, depths, snapped):
     """Set a polygon up: edge functions a x + b y + c >= 0 inside, boxes, depths; returns twice its signed area.
 
@@ -43,7 +43,7 @@ def set_up(polygon, edges, boxes, depths, snapped):
     return set_edges(polygon, edges, boxes, depths, snapped)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def snap(polygon, boxes, snapped):
     """Snap the vertices to the sub-pixel grid and fill the polygon's own box: all that choosing stamps needs."""
     for d in range(2):
@@ -59,7 +59,7 @@ def snap(polygon, boxes, snapped):
         boxes[0, 2 + d] = high
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_edges(polygon, edges, boxes, depths, snapped):
     """Set up edges and depths of snapped vertices; returns twice the signed area."""
     area = _triangle(snapped, 1, 2, 0, edges, boxes)
@@ -73,7 +73,7 @@ def set_edges(polygon, edges, boxes, depths, snapped):
     return area
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _triangle(snapped, j, k, t, edges, boxes):
     """Edges 0-j, j-k, k-0 of triangle t, turned so that the inside is positive; returns twice the signed area."""
     xi, yi, xj, yj, xk, yk = (
@@ -90,7 +90,7 @@ def _triangle(snapped, j, k, t, edges, boxes):
     return area
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _edge(x0, y0, x1, y1, sign, edges, row):
     """One edge function; a triangle without area (sign 0) owns nothing and so covers nothing."""
     a = sign * (y0 - y1)
@@ -101,7 +101,7 @@ def _edge(x0, y0, x1, y1, sign, edges, row):
     edges[row, 3] = rule if sign != 0 else 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def covering_triangle(edges, x, y):
     """Triangle of the polygon (0 or 1) that covers the sample, -1 if none does: one sample test."""
     for first in range(0, EDGE_ROWS, 3):
@@ -114,7 +114,7 @@ def covering_triangle(edges, x, y):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def depth_at(edges, depths, triangle, x, y):
     """Depth of a triangle at a sample that it covers: barycentric, float64, rounded once to float32."""
     first = 3 * triangle
@@ -125,13 +125,13 @@ def depth_at(edges, depths, triangle, x, y):
     return np.float32(weighted / (at_0 + at_1 + at_2))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _value(edges, row, x, y):
     """Evaluate an edge function without the top-left rule."""
     return edges[row, 0] * x + edges[row, 1] * y + edges[row, 2] + edges[row, 3]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def touches(edges, boxes, corners, x0, y0, x1, y1):
     """Whether the polygon reaches into the square from (x0, y0) up to, not including, (x1, y1)."""
     for triangle in range(corners - 2):
@@ -150,7 +150,7 @@ def touches(edges, boxes, corners, x0, y0, x1, y1):
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fills(edges, corners, x0, y0, x1, y1):
     """Whether one triangle of the polygon covers all of the square: every sample in it is hit, without a test."""
     for triangle in range(corners - 2):

@@ -7,13 +7,13 @@ picture does not depend on the order of arrival.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.atomics import add_requests, count_atomics
-from models.simt import Simt
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.models.atomics import add_requests, count_atomics
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 
 WORD_BYTES = 8  # depth and polygon
 BACKGROUND = 255
@@ -60,7 +60,7 @@ def new_samples(width: int, height: int, offsets: NDArray[np.int64]) -> Samples:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def keep_nearest(samples, x, y, s, depth, polygon):
     """Atomic minimum of one hit; returns the byte address it went to."""
     at = (y * samples.width + x) * len(samples.offsets) + s
@@ -70,7 +70,7 @@ def keep_nearest(samples, x, y, s, depth, polygon):
     return at * WORD_BYTES
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_hits(row, first, samples, addresses, hits, merge):
     """Add one warp's atomic instruction to columns ``first``.. of a row: lanes, requests, conflicts, depth.
 
@@ -84,7 +84,7 @@ def count_hits(row, first, samples, addresses, hits, merge):
     add_requests(addresses, hits, merge, 0, samples.requests)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def on_screen(boxes, width, height):
     """Clip a polygon's box to the screen: x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if nothing is left."""
     return (
@@ -95,7 +95,7 @@ def on_screen(boxes, width, height):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pixel_box(boxes, width, height):
     """First and last pixel (x0, y0, x1, y1) of a polygon's box, on screen; empty if x1 < x0 or y1 < y0."""
     x0, y0, x1, y1 = on_screen(boxes, width, height)

@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.scenes import catmull_clark
-from simulator.scenes.scene import Mesh, Patches, Scene
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.scenes import catmull_clark
+from tilestamp.simulator.scenes.scene import Mesh, Patches, Scene
 
 GUARD_PIXELS = 1 << 17  # beyond it the sub-pixel arithmetic would not fit 64 bits
 NEAR = 1e-6  # least w: polygons that cross the eye's plane are dropped, and counted
@@ -144,7 +144,7 @@ def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:
     return rates
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _evaluate(points, rates, ends, polygons):
     """Fill ``polygons`` (sum of rates^2, 4, 4) with the quads of each patch, row by row."""
     grid = np.empty((rates.max() + 1, rates.max() + 1, 4)) if len(rates) else np.empty((0, 0, 4))
@@ -172,7 +172,7 @@ def _evaluate(points, rates, ends, polygons):
                 at += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _bernstein(t, out):
     s = 1.0 - t
     out[0] = s * s * s

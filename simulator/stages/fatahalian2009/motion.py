@@ -9,14 +9,14 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from models.errors import TilestampError
-from simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, new_samples
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 
 CHUNK = 256  # polygons of a unit of work
 MOST_SAMPLES = 1024  # a pixel
@@ -148,7 +148,7 @@ def _reversed_bits(n: NDArray[np.int64], base: int) -> NDArray[np.float64]:
     return result
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def put(start, end, blur, p, time, u, v, polygon):
     """Write polygon p as it stands at a time and a lens point to ``polygon`` (3 or 4, 3)."""
     for k in range(start.shape[1]):
@@ -158,7 +158,7 @@ def put(start, end, blur, p, time, u, v, polygon):
         polygon[k, 1] += blur[p, k] * v
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def test_sample(p, setup, samples, x, y, s, at_x, at_y):
     """One sample test of the polygon that is set up; returns 1 for a hit."""
     triangle = covering_triangle(setup[0], at_x, at_y)
@@ -169,7 +169,7 @@ def test_sample(p, setup, samples, x, y, s, at_x, at_y):
     return 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_up_at(start, end, blur, p, time_lens, polygon, setup):
     """Place a polygon and set it up."""
     put(start, end, blur, p, time_lens[0], time_lens[1], time_lens[2], polygon)

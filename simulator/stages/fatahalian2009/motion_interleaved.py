@@ -6,11 +6,11 @@ point. How far it moves makes no difference; there are as many set-ups as distin
 """
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, pixel_box
-from simulator.stages.fatahalian2009.motion import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, pixel_box
+from tilestamp.simulator.stages.fatahalian2009.motion import (
     CHUNK,
     BlurPattern,
     MotionEvent,
@@ -18,7 +18,7 @@ from simulator.stages.fatahalian2009.motion import (
     set_up_at,
     test_sample,
 )
-from simulator.work import Work
+from tilestamp.simulator.work import Work
 
 BLOCK = 128
 
@@ -30,7 +30,7 @@ def motion_interleaved(polygons: MovingMicropolygons, pattern: BlurPattern, samp
     return Work("motion", "interleaved", MotionEvent, table, max(1, len(table)), BLOCK)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _motion_interleaved(start, end, blur, pattern, samples, table):
     setup = new_setup()
     polygon = np.empty(start.shape[1:], np.float32)

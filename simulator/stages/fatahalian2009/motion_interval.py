@@ -6,12 +6,12 @@ Brute force is the same with the bounds of the whole shutter and the whole lens:
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples
-from simulator.stages.fatahalian2009.motion import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples
+from tilestamp.simulator.stages.fatahalian2009.motion import (
     CHUNK,
     BlurPattern,
     MotionEvent,
@@ -19,7 +19,7 @@ from simulator.stages.fatahalian2009.motion import (
     set_up_at,
     test_sample,
 )
-from simulator.work import Work
+from tilestamp.simulator.work import Work
 
 EVERYTHING = (0.0, 1.0, -1.0, 1.0, -1.0, 1.0)  # time, lens u, lens v
 MARGIN = 1.0 / 64.0  # pixels: covers the rounding of placed vertices to float32
@@ -50,7 +50,7 @@ def _draw(
     return Work("motion", kernel, MotionEvent, table, max(1, len(table)), BLOCK)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _motion_interval(start, end, blur, pattern, samples, intervals, table):
     setup = new_setup()
     polygon = np.empty(start.shape[1:], np.float32)
@@ -71,7 +71,7 @@ def _motion_interval(start, end, blur, pattern, samples, intervals, table):
                     row[MotionEvent.SAMPLE_HITS] += test_sample(p, setup, samples, x, y, s, at_x, at_y)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _bound(start, end, blur, p, interval, samples):
     """Pixels x0, y0, x1, y1 that the polygon may reach in an interval, on screen."""
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf

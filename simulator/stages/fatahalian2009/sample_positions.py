@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
+from tilestamp.models.errors import TilestampError
 
 SUBPIXELS = 4096  # steps of the sub-pixel grid along an axis: vertices and samples are snapped to it
 MOST_SAMPLES = 16

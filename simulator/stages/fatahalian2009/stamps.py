@@ -12,13 +12,13 @@ from enum import IntEnum
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from models.coalescing import contiguous
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.fatahalian2009.micropolygon_cover import (
+from tilestamp.models.coalescing import contiguous
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
     depth_at,
@@ -27,9 +27,15 @@ from simulator.stages.fatahalian2009.micropolygon_cover import (
     set_up,
     touches,
 )
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, count_hits, keep_nearest, on_screen
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.work import Work
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    blocks,
+    count_hits,
+    keep_nearest,
+    on_screen,
+)
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.work import Work
 
 Touch = Literal["box", "polygon"]
 CHUNK = 256  # polygons that a warp draws from the queue
@@ -114,7 +120,7 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _stamps(vertices, samples, shape, simt, table):
     setup = new_setup()
     corners = vertices.shape[1]
@@ -138,7 +144,7 @@ def _stamps(vertices, samples, shape, simt, table):
                 _one_level(p, corners, setup, samples, shape, simt, row, addresses, box)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _two_levels(p, corners, setup, samples, shape, simt, row, addresses, box):
     """Sort the coarse stamps of a box into culled, filled, and those to be cut into stamps."""
     edges, boxes, _, _ = setup
@@ -157,7 +163,7 @@ def _two_levels(p, corners, setup, samples, shape, simt, row, addresses, box):
     row[StampsEvent.COARSE_WARPS] += -(-seen // simt.warp)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _one_level(p, corners, setup, samples, shape, simt, row, addresses, box):
     """Test the stamps of a box in row order, whole stamps to a warp where they fit."""
     edges, boxes, _, _ = setup
@@ -181,7 +187,7 @@ def _one_level(p, corners, setup, samples, shape, simt, row, addresses, box):
     row[StampsEvent.BOX_WARPS] += -(-looked // simt.warp)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _test_stamp(p, setup, samples, shape, simt, row, addresses, i, j, used, hits):
     """Test every sample of one stamp, those off screen in vain; returns the lanes in use and their hits."""
     edges, _, depths, _ = setup
@@ -203,7 +209,7 @@ def _test_stamp(p, setup, samples, shape, simt, row, addresses, i, j, used, hits
     return used, hits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _end_warp(samples, simt, row, addresses, used, hits):
     """Count one warp execution of the test, and the atomics of its hits; returns no lanes in use, no hits."""
     if used > 0:
@@ -215,7 +221,7 @@ def _end_warp(samples, simt, row, addresses, used, hits):
     return 0, 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(p, setup, samples, simt, row, addresses, left, top, size):
     """Write every sample of a coarse stamp that one triangle fills, a warp's worth at a time."""
     edges, _, depths, _ = setup
@@ -233,7 +239,7 @@ def _fill(p, setup, samples, simt, row, addresses, left, top, size):
     _end_fill(samples, simt, row, addresses, used)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _end_fill(samples, simt, row, addresses, used):
     if used > 0:
         row[StampsEvent.FILLED_SAMPLES] += used

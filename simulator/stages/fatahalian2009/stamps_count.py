@@ -7,11 +7,11 @@ its own box are looked at. The counts are those that ``stamps`` counts by execut
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.fatahalian2009.micropolygon_cover import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
     new_setup,
@@ -19,9 +19,9 @@ from simulator.stages.fatahalian2009.micropolygon_cover import (
     snap,
     touches,
 )
-from simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.fatahalian2009.stamps import StampShape
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.stamps import StampShape
 
 SMALLEST_PART = 1024  # polygons
 
@@ -60,7 +60,7 @@ def count_tests(
     return SampleCount(tests, hits)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count(part, parts, vertices, width, height, offsets, shape, counts):
     """Count the polygons of one part; edges are set up only where a sample lies in the box, or stamps are chosen."""
     edges, boxes, depths, snapped = new_setup()
@@ -94,7 +94,7 @@ def _count(part, parts, vertices, width, height, offsets, shape, counts):
     counts[part, 1] = hits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _touched(edges, boxes, corners, shape, i0, j0, i1, j1):
     """Stamps of a box that the polygon reaches; one that holds all of a polygon with an area certainly is."""
     wide, high = shape.width * STEP, shape.height * STEP

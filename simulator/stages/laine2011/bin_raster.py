@@ -12,19 +12,19 @@ Which block draws which batch is decided by the machine; here batch b goes to bl
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.borrow import row_of
-from simulator.stages.laine2011.bin_raster_batch import BinInput, _play_batch
-from simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
-from simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
-from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.borrow import row_of
+from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, _play_batch
+from tilestamp.simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
+from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.simulator.work import Work
 
 RELEASES = ("1.1", "nvdiffrast")
 STREAMS = 16  # blocks, and streams of a bin
@@ -48,7 +48,7 @@ class BinQueues(NamedTuple):
     bins_y: int
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _play_part(part, parts, given, batch, counts, entries, events):
     """Play a share of the batches, each with its own rows: see ``_play_batch``."""
     for b in range(counts.shape[0] * part // parts, counts.shape[0] * (part + 1) // parts):

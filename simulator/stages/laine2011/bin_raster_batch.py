@@ -8,10 +8,10 @@ the path of a warp (which decides whether its triangles are tested) depends on t
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.laine2011.bin_raster_count import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.bin_raster_count import (
     BLOCK,
     ENTRY_BYTES,
     FAST,
@@ -25,7 +25,7 @@ from simulator.stages.laine2011.bin_raster_count import (
     _count_segments,
     _count_visible,
 )
-from simulator.stages.laine2011.bin_raster_cover import (
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     BIN_SIDE_LOG2,
     SINGLE_TRIANGLE,
     WARP,
@@ -38,7 +38,7 @@ from simulator.stages.laine2011.bin_raster_cover import (
     _touches,
     _walk_votes,
 )
-from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 
 RING = 2048  # entries that wait for their round
 
@@ -66,7 +66,7 @@ class BinScratch(NamedTuple):
     segment: NDArray[np.int64]  # (bins,) last segment of each bin, by the order of allocation in the batch
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_scratch(bins, counting):
     steps = bins if counting else 0
     stamp = np.zeros((steps, bins), np.int64)
@@ -74,7 +74,7 @@ def _new_scratch(bins, counting):
     return BinScratch(np.empty(RING, i64), np.zeros(bins, i64), stamp, np.zeros(2, i64), np.zeros(bins, i64))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _read_step(given, ring, read, write, first, end, events):
     """Read 512 counts and append their sub-triangles in order; returns the next triangle and the ring's end.
 
@@ -109,7 +109,7 @@ def _read_step(given, ring, read, write, first, end, events):
     return go_on, write
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _load_warp(given, ring, first, lanes, boxes):
     """Boxes of a warp's triangles; returns the path that follows from them, and the bins of the largest box."""
     largest, path = 1, SINGLE
@@ -130,7 +130,7 @@ def _load_warp(given, ring, first, lanes, boxes):
     return path, largest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, events):
     """Append a warp's triangles to the bins that they touch; count the segments of memory that this writes."""
     emits, stores = 0, 0
@@ -156,7 +156,7 @@ def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, event
         events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _distinct_bins(boxes, lanes):
     """Distinct bins of a warp whose boxes are one bin each."""
     distinct = 0
@@ -170,7 +170,7 @@ def _distinct_bins(boxes, lanes):
     return distinct
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
     """Count what a warp's loads, its path and the walk to its queues cost."""
     area, indirect = 0, False
@@ -202,7 +202,7 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
     _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _play_batch(given, b, batch, counts, entries, events):
     """Bin the input triangles of batch b, of ``batch`` triangles.
 

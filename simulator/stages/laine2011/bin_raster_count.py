@@ -1,9 +1,8 @@
 """What bin raster counts: loads, atomics, segments and their writes, and what a round waits for."""
 
-from numba import njit
-
-from simulator.stages.laine2011.bin_raster_cover import WARP
-from simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import WARP
+from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 
 BLOCK = 512  # threads, and triangles of a round
 BIN_SEGMENT = 512  # entries
@@ -11,14 +10,14 @@ ENTRY_BYTES = 4
 SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x 2, anything
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_load(events, loads, segments, size):
     events[BinRasterEvent.LOAD] += loads
     events[BinRasterEvent.LOAD_TRANSACTIONS] += segments
     events[BinRasterEvent.LOAD_BYTES] += size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_atomic(events, executed):
     """One thread's global atomic: a draw, or the allocation of a round's segments."""
     events[BinRasterEvent.ATOMIC] += executed
@@ -27,7 +26,7 @@ def _count_atomic(events, executed):
     events[BinRasterEvent.ATOMIC_DEPTH] += executed
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_visible(subtriangles, events):
     """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
     most = 0
@@ -37,7 +36,7 @@ def _count_visible(subtriangles, events):
     events[BinRasterEvent.MULTI_WARPS] += most > 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_bins(bins, events):
     """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
     warps = (bins + WARP - 1) // WARP
@@ -48,7 +47,7 @@ def _count_bins(bins, events):
     events[BinRasterEvent.MASK_LANES] += BLOCK // WARP * min(bins, WARP)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_longest(walk, steps, paths, events):
     """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
     events[BinRasterEvent.LONGEST_WALKS] += walk
@@ -58,7 +57,7 @@ def _count_longest(walk, steps, paths, events):
     events[BinRasterEvent.SLOW_ROUNDS] += (paths >> SLOW) & 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_segments(given, counts, scratch, events):
     """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
 
@@ -85,7 +84,7 @@ def _count_segments(given, counts, scratch, events):
     _count_atomic(events, fresh > 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_closing(given, counts, scratch, events):
     """Count the open segments at the end of a batch, and the writes of their counts."""
     for first in range(0, counts.size, WARP):
@@ -100,18 +99,18 @@ def _count_closing(given, counts, scratch, events):
         _count_store(events, stores, given.segment_bytes)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_store(events, segments, size):
     events[BinRasterEvent.STORE_TRANSACTIONS] += segments
     events[BinRasterEvent.STORE_BYTES] += segments * size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sectors(first, words, size):
     """Memory segments of ``words`` words from word ``first`` on."""
     return ((first + words) * ENTRY_BYTES - 1) // size - first * ENTRY_BYTES // size + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _segments(entries):
     return (entries + BIN_SEGMENT - 1) // BIN_SEGMENT

@@ -8,12 +8,12 @@ every square that passes, by an OR in shared memory. The functions here work on 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import SECTOR_BYTES, SEGMENT_BYTES
-from models.errors import TilestampError
-from models.simt import Coalescing, Simt
+from tilestamp.models.coalescing import SECTOR_BYTES, SEGMENT_BYTES
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Coalescing, Simt
 
 WARP = 32  # lanes; the original's ballots and its masks of 32 bits know no other width
 HEADER_BYTES = 16  # six int16 coordinates and one word
@@ -32,7 +32,7 @@ class WarpBoxes(NamedTuple):
     bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank in the current instruction
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_boxes():
     return WarpBoxes(
         np.zeros(WARP, np.int64),
@@ -43,7 +43,7 @@ def _new_boxes():
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _entry_slot(entry, misc):
     """Slot of a queue entry: the triangle's own, or the sub-triangle's in the run that its header's word points to."""
     part = entry & 7
@@ -52,7 +52,7 @@ def _entry_slot(entry, misc):
     return np.int64(misc[entry >> 3]) + part
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
     """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
     x0, y0, x1, y1, x2, y2 = (
@@ -71,7 +71,7 @@ def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
     box[3] = min(max(max(y0, y1, y2) >> shift, 0), last_y) - low_y + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lane_edges(boxes, lane, header, dx, dy, shift):
     """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
     side = np.int64(1) << shift
@@ -84,7 +84,7 @@ def _lane_edges(boxes, lane, header, dx, dy, shift):
         boxes.edge[lane, k] = (ax - corner_x) * ey - (ay - corner_y) * ex + side * (max(ex, 0) - min(ey, 0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _touches(boxes, lane, column, row):
     """Whether the triangle touches the closed square (column, row) of its box: no edge has it wholly outside."""
     for k in range(3):
@@ -93,7 +93,7 @@ def _touches(boxes, lane, column, row):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_corner(boxes, lanes, stride, wide, high):
     """Replays of the OR at one corner of all boxes (``wide``/``high``: of those two squares wide/high); -1: no lane."""
     boxes.bank[:] = 0
@@ -107,7 +107,7 @@ def _count_corner(boxes, lanes, stride, wide, high):
     return deepest - 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _small_votes(boxes, lanes, stride):
     """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
     ors, replays = 0, 0
@@ -118,7 +118,7 @@ def _small_votes(boxes, lanes, stride):
     return ors, replays
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _walk_votes(boxes, lanes, steps, stride):
     """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
     ors, replays, ends = 0, 0, 0
@@ -141,7 +141,7 @@ def _walk_votes(boxes, lanes, steps, stride):
     return ors, replays, ends
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _header_load(slot, lanes, segment_bytes):
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
 

@@ -11,17 +11,17 @@ bins complete in the order in which they are drawn. No picture depends on it.
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import SECTOR_BYTES
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts
-from simulator.stages.borrow import row_of
-from simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
-from simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
-from simulator.stages.laine2011.coarse_raster_bin import (
+from tilestamp.models.coalescing import SECTOR_BYTES
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stages.borrow import row_of
+from tilestamp.simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
+from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
     BIN_TILES,
     BLOCK,
     ENTRY_BYTES,
@@ -30,8 +30,8 @@ from simulator.stages.laine2011.coarse_raster_bin import (
     CoarseInput,
     _play_bin,
 )
-from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
-from simulator.work import Work
+from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from tilestamp.simulator.work import Work
 
 TILE_PIXELS = 8
 SEGMENT_BYTES = TILE_SEGMENT * ENTRY_BYTES + 8  # entries, next and count
@@ -52,7 +52,7 @@ class TileQueues(NamedTuple):
     tiles_y: int
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _play_part(part, _parts, given, order, counts, entries, events):
     """Play one bin, with its own rows: see ``_play_bin``."""
     _play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))

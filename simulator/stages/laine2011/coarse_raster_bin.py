@@ -8,10 +8,10 @@ bin raster a bin is played twice, to count and to fill.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.laine2011.bin_raster_cover import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
     WARP,
@@ -24,7 +24,7 @@ from simulator.stages.laine2011.bin_raster_cover import (
     _touches,
     _walk_votes,
 )
-from simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 
 BLOCK = 512  # threads, and entries of a round
 BIN_SEGMENT = 512  # entries
@@ -63,7 +63,7 @@ class Place(NamedTuple):
     move_y: int
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _place(given, b):
     bx, by = b % given.bins_x, b // given.bins_x
     return Place(
@@ -76,7 +76,7 @@ def _place(given, b):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _load_warp(given, place, first, lanes, boxes):
     """Boxes of a warp's triangles; returns its case, tiles of the largest and of the union box, and its rows."""
     small = True
@@ -100,7 +100,7 @@ def _load_warp(given, place, first, lanes, boxes):
     return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, rows
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _emit_warp(case, boxes, lanes, counts, queues):
     """Append a warp's triangles to the tiles that they touch."""
     for lane in range(lanes):
@@ -114,7 +114,7 @@ def _emit_warp(case, boxes, lanes, counts, queues):
                     counts[tile] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
     """Count what a warp's loads and its case cost."""
     area, indirect = 0, False
@@ -143,14 +143,14 @@ def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
     _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_load(events, loads, segments, size):
     events[CoarseRasterEvent.LOAD] += loads
     events[CoarseRasterEvent.LOAD_TRANSACTIONS] += segments
     events[CoarseRasterEvent.LOAD_BYTES] += size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_atomic(events, executed):
     """One thread's global atomic."""
     events[CoarseRasterEvent.ATOMIC] += executed
@@ -159,7 +159,7 @@ def _count_atomic(events, executed):
     events[CoarseRasterEvent.ATOMIC_DEPTH] += executed
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_emits(given, counts, before, tails, events):
     """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
     fresh, touched, emits, stores = 0, 0, 0, 0
@@ -199,7 +199,7 @@ def _count_emits(given, counts, before, tails, events):
     _count_atomic(events, fresh > 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_tails(given, counts, tails, events):
     """Count the writes that end the tiles' lists: the last segment's link, and its count where it is not full.
 
@@ -218,7 +218,7 @@ def _count_tails(given, counts, tails, events):
         events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_merge(given, b, events):
     """Count the merges: a round takes whole segments until more than 512 entries wait, or none is left."""
     write, read, batch, taken = 0, 0, 0, 0
@@ -241,7 +241,7 @@ def _count_merge(given, b, events):
         read += min(BLOCK, write - read)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _play_bin(given, b, counts, queues, events):
     """Find the tiles of a bin's entries.
 

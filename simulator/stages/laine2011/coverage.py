@@ -7,7 +7,8 @@ pixel (x, y) of the tile at bit 8 * y + 7 - x, so that ascending bits are the or
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from tilestamp.models.kernel import kernel
 
 TILE = 8  # pixels
 _EDGE_0, _EDGE_1, _EDGE_2 = np.int64(0), np.int64(1), np.int64(2)  # a kernel is compiled anew for each literal
@@ -15,13 +16,13 @@ SAMPLE_COLUMN = np.array([[0] * 8, [0, 1] + [0] * 6, [1, 3, 0, 2] + [0] * 4, [7,
 """Column of the sample in each row of the pixel, by log2 of the samples."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _exclusive(dx: int, dy: int) -> Any:
     """1 where a sample exactly on the edge is outside (right edges, and upper horizontal ones), else 0."""
     return 1 if dy > 0 or (dy == 0 and dx <= 0) else 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _first_value(header: Any, k: int, x: int, y: int) -> Any:
     """Edge k -> k + 1 of the triangle at (x, y), less its threshold; and the edge's direction. Negative: outside."""
     m = (k + 1) % 3
@@ -30,7 +31,7 @@ def _first_value(header: Any, k: int, x: int, y: int) -> Any:
     return (px - x) * dy - (py - y) * dx - _exclusive(dx, dy), dx, dy
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels of a tile whose centre is covered.
 
@@ -54,13 +55,13 @@ def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     return _box_mask(header, left, bottom, first, last, low, high, 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def square_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels whose square may be touched: the conservative mask of several samples a pixel."""
     return _box_mask(header, left, bottom, 0, TILE - 1, 0, TILE - 1, 8)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _box_mask(header: Any, left: int, bottom: int, first: int, last: int, low: int, high: int, margin: int) -> Any:
     """Mask of the pixels in a box, with every edge moved outwards by ``margin`` in both axes."""
     mask = np.uint64(0)
@@ -88,7 +89,7 @@ def _box_mask(header: Any, left: int, bottom: int, first: int, last: int, low: i
     return mask
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
     """Find the samples of one pixel that are covered.
 
@@ -120,7 +121,7 @@ def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
     return mask
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def centroid_sample(mask: Any, log_samples: int) -> Any:
     """Covered sample nearest to the centre; -1, the centre itself, where all or none are covered."""
     samples = 1 << log_samples

@@ -7,8 +7,10 @@ instruction through an overload.
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic, overload
+
+from tilestamp.models.kernel import kernel
 
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding and taking it away rounds a double to even
 
@@ -84,7 +86,7 @@ def _lowest_bit(bits):  # type: ignore[no-untyped-def]
     return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def round_to_int32(value: Any) -> Any:
     """Float to int32: half to even, saturating, NaN to 0; returned as int64."""
     if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
@@ -93,7 +95,7 @@ def round_to_int32(value: Any) -> Any:
     return np.int64((wide + _ROUND) - _ROUND)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def round_to_uint32(value: Any) -> Any:
     """Float to uint32: half to even, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
@@ -102,7 +104,7 @@ def round_to_uint32(value: Any) -> Any:
     return np.int64((wide + _ROUND) - _ROUND)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def truncate_to_uint32(value: Any) -> Any:
     """Float to uint32 towards zero, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
@@ -110,19 +112,19 @@ def truncate_to_uint32(value: Any) -> Any:
     return np.int64(min(np.float64(value), 4294967295.0))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def wrap_int32(value: Any) -> Any:
     """Low 32 bits as a signed number."""
     return ((value + 2147483648) & 4294967295) - 2147483648
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def float_bits(value: Any) -> Any:
     """Bits of a float32 as a signed number."""
     return np.int64(np.float32(value).view(np.int32))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def biased_exponent(value: Any) -> Any:
     """Exponent field of a float32; 0 for anything negative."""
     return max(float_bits(value), 0) >> 23

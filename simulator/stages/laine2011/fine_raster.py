@@ -7,16 +7,16 @@ the others, and draws their fragments 32 at a time, in input order: depth test, 
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Coalescing, Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.borrow import borrow, row_of
-from simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
-from simulator.stages.laine2011.fine_raster_queue import (
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.borrow import borrow, row_of
+from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     HEADER_BYTES,
     PIXELS,
     SEGMENT,
@@ -28,11 +28,11 @@ from simulator.stages.laine2011.fine_raster_queue import (
     new_tile,
     start_tile,
 )
-from simulator.stages.laine2011.fine_raster_single import draw_tile_single
-from simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
-from simulator.stages.laine2011.triangle_setup import Release
-from simulator.stages.laine2011.triangle_setup_paths import Setup
-from simulator.work import Work
+from tilestamp.simulator.stages.laine2011.fine_raster_single import draw_tile_single
+from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
+from tilestamp.simulator.stages.laine2011.triangle_setup import Release
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.work import Work
 
 Mode = Literal["depth", "blend", "depth-only", "color"]
 
@@ -59,7 +59,7 @@ class FrameBuffers(NamedTuple):
     ids: NDArray[np.int32]  # input triangle, -1 where nothing was drawn
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
@@ -72,7 +72,7 @@ def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
                 tile.ids[at] = buffers.ids[sample, j, i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _store_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
@@ -82,7 +82,7 @@ def _store_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
             buffers.ids[sample, j, i] = tile.ids[at]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_tile(draw: Draw, row: Any) -> None:
     """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
 
@@ -105,7 +105,7 @@ def _count_tile(draw: Draw, row: Any) -> None:
         row[30] += 32 * rows
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_part(
     part: int,
     parts: int,
@@ -128,7 +128,7 @@ def _draw_part(
     tile.state[0] = 0  # the owner lives to here
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_tiles(
     first: int,
     last: int,
@@ -156,7 +156,7 @@ def _draw_tiles(
         _store_tile(buffers, draw, tile, x, y)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def draw_tile(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, several: Any, row: Any
 ) -> None:

@@ -6,11 +6,11 @@ The tile in shared memory holds the farthest depth of each pixel; depths and col
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.coverage import SAMPLE_COLUMN, centroid_sample, sample_mask
-from simulator.stages.laine2011.exact import popcount
-from simulator.stages.laine2011.fine_raster_queue import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN, centroid_sample, sample_mask
+from tilestamp.simulator.stages.laine2011.exact import popcount
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
     NEXT,
@@ -23,15 +23,15 @@ from simulator.stages.laine2011.fine_raster_queue import (
     take,
     update_zmax,
 )
-from simulator.stages.laine2011.fine_raster_shade import blend_over, shade
-from simulator.stages.laine2011.fine_raster_single import count_reads
-from simulator.stages.laine2011.subtriangle import DEPTH_MAX
-from simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over, shade
+from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads
+from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 _LOW = 0xFFFFFFFF
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _hidden(record: Any, misc: Any, zmax: Any, x: int, y: int, s: int) -> Any:
     """Whether a fragment lies behind all samples of its pixel, by the nearest depth that it could have there."""
     zx, zy, zb, slope = np.int64(record[0]), np.int64(record[1]), np.int64(record[2]), np.int64(record[3])
@@ -39,7 +39,7 @@ def _hidden(record: Any, misc: Any, zmax: Any, x: int, y: int, s: int) -> Any:
     return (nearest >= zmax and nearest < ((nearest + 2 * slope) & _LOW)) or (np.int64(misc) & 0xFFFFF000) >= zmax
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bottom: int, row: Any) -> Any:
     """Depth and sample tests of n fragments; survivors move to the front, their samples to ``tile.mask``."""
     kept = killed = hits = 0
@@ -68,7 +68,7 @@ def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bot
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, color: Any, x: int, y: int) -> Any:
     """Depth test and write of one sample of one survivor; True where it was written."""
     p, slot = tile.pixel[lane], tile.slot[lane]
@@ -86,7 +86,7 @@ def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, 
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rop(
     setup: Setup, draw: Draw, tile: Tile, kept: int, sample: int, colors_of_lanes: Any, column: int, line: int
 ) -> Any:
@@ -106,7 +106,7 @@ def _rop(
     return writes, longest if draw.depth or draw.blend else min(longest, 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lower_zmax(tile: Tile, kept: int, samples: int) -> None:
     """Take the farthest sample of each written pixel anew."""
     for lane in range(kept):
@@ -120,7 +120,7 @@ def _lower_zmax(tile: Tile, kept: int, samples: int) -> None:
             tile.zmax[p] = farthest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shade_survivors(
     setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, shaded: Any, column: int, line: int
 ) -> None:
@@ -131,7 +131,7 @@ def _shade_survivors(
         shaded[lane] = shade(setup.planes[tile.slot[lane]], colors, x, y, centroid, draw)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, row: Any) -> None:
     """Count the surface reads and writes of one sample: a row of the tile is one 32-byte segment."""
     read = written = 0
@@ -149,7 +149,7 @@ def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, 
     row[30] += 32 * rows
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def draw_tile_multi(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
 ) -> None:

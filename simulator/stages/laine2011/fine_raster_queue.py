@@ -4,13 +4,13 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from models.coalescing import transactions
-from simulator.stages.laine2011.coverage import pixel_mask, square_mask
-from simulator.stages.laine2011.exact import lowest_bit, popcount
-from simulator.stages.laine2011.subtriangle import DEPTH_MAX
-from simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
+from tilestamp.simulator.stages.laine2011.exact import lowest_bit, popcount
+from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 TILE = 8  # pixels
 PIXELS = TILE * TILE
@@ -102,7 +102,7 @@ class Tile(NamedTuple):
 HEAD, TAIL, FRAGMENTS, NEXT, END, ZMAX, UPDATE = range(7)  # columns of Tile.state
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_tile(samples: int) -> Any:
     """Scratch for one warp."""
     many, i64 = samples * PIXELS, np.int64
@@ -113,7 +113,7 @@ def new_tile(samples: int) -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def corner(tile_index: int, draw: Draw) -> Any:
     """Lower left corner of a tile in the units of headers."""
     left = (tile_index % draw.tiles_x) * (16 * TILE) - draw.half_width
@@ -121,7 +121,7 @@ def corner(tile_index: int, draw: Draw) -> Any:
     return left, bottom
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def update_zmax(depths: Any, state: Any, row: Any) -> None:
     """Take the tile's largest depth anew, if a fragment has covered a pixel that had it."""
     if state[UPDATE]:
@@ -131,7 +131,7 @@ def update_zmax(depths: Any, state: Any, row: Any) -> None:
             row[6] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     """Count a load of ``size`` bytes by each of n lanes at ``tile.addresses``."""
     count, read = transactions(tile.addresses, n, size, draw.coalescing)
@@ -139,7 +139,7 @@ def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     row[28] += read
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read up to 32 entries, cull them by depth, and queue those with a non-empty mask."""
     state = tile.state
@@ -186,7 +186,7 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
         count_gather(tile, n, HEADER_BYTES, draw, row)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read on until 32 fragments are queued or the list ends."""
     state = tile.state
@@ -201,7 +201,7 @@ def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom
         read_segment(setup, entries, draw, tile, left, bottom, row)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def take(tile: Tile) -> Any:
     """Move up to 32 fragments in order from the queue to the lanes; returns how many."""
     state = tile.state
@@ -221,7 +221,7 @@ def take(tile: Tile) -> Any:
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def start_tile(tile: Tile, begin: int, end: int) -> None:
     """Empty the queue for a tile whose list is entries begin..end-1."""
     tile.state[:] = 0

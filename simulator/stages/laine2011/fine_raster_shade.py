@@ -3,28 +3,28 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.coverage import SAMPLE_COLUMN
-from simulator.stages.laine2011.exact import wrap_int32
-from simulator.stages.laine2011.fine_raster_queue import Draw
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from tilestamp.simulator.stages.laine2011.exact import wrap_int32
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import Draw
 
 _PLANES = np.array([4, 7, 10])  # where the planes of 1/w, u/w and v/w begin in a record
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _plane(record: Any, at: Any, x: Any, y: Any) -> Any:
     value = np.int64(record[at]) * x + np.int64(record[at + 1]) * y + np.int64(record[at + 2])
     return np.float32(wrap_int32(value))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _channel(value: Any) -> Any:
     """Eight bits of a channel in 0..1, rounded to nearest, saturating."""
     return np.int64(min(max(np.floor(np.float64(value) * 255.0 + 0.5), 0.0), 255.0)) if value == value else 0  # noqa: PLR0124
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
     """Interpolated vertex colour of one fragment, as 8-bit RGBA.
 
@@ -56,7 +56,7 @@ def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> 
     return packed
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend_over(source: Any, target: int) -> Any:
     """Source over target, channel by channel, alpha too."""
     alpha = (source >> 24) & 255

@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.fine_raster_queue import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
     HEAD,
@@ -21,14 +21,14 @@ from simulator.stages.laine2011.fine_raster_queue import (
     take,
     update_zmax,
 )
-from simulator.stages.laine2011.fine_raster_shade import blend_over, shade
-from simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over, shade
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 _LOW = 0xFFFFFFFF
 _DATA_BYTES = 4  # a word of the data record
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write(setup: Setup, colors: Any, draw: Draw, tile: Tile, lane: int, x: int, y: int) -> None:
     """Put one fragment's colour and triangle into the tile."""
     p, slot = tile.pixel[lane], tile.slot[lane]
@@ -39,7 +39,7 @@ def _write(setup: Setup, colors: Any, draw: Draw, tile: Tile, lane: int, x: int,
     tile.color[p] = blend_over(color, tile.color[p]) if draw.blend else color
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _depth_test(setup: Setup, draw: Draw, tile: Tile, n: int, column: int, line: int) -> Any:
     """Test n fragments against the depths before the round; survivors move to the front, depths to ``tile.mask``."""
     kept = 0
@@ -59,7 +59,7 @@ def _depth_test(setup: Setup, draw: Draw, tile: Tile, n: int, column: int, line:
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _rop(setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, column: int, line: int) -> Any:
     """Write survivors in order; returns the writes, and the most that one pixel had."""
     writes = longest = 0
@@ -81,7 +81,7 @@ def _rop(setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, column: i
     return writes, longest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _conflicts(tile: Tile, kept: int) -> Any:
     """Most survivors at one pixel, less one: the passes that a shared atomic takes again."""
     most = 0
@@ -93,7 +93,7 @@ def _conflicts(tile: Tile, kept: int) -> Any:
     return max(most - 1, 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_reads(setup: Setup, draw: Draw, tile: Tile, n: int, words: int, row: Any) -> None:
     """Count 16-byte reads of data records by n lanes, one for each of the ``words`` (bit k: bytes 16 * k on)."""
     for part in range(4):
@@ -103,7 +103,7 @@ def count_reads(setup: Setup, draw: Draw, tile: Tile, n: int, words: int, row: A
             count_gather(tile, n, 16, draw, row)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes: int, longest: Any, row: Any) -> None:
     row[7] += 1
     row[8] += n
@@ -124,7 +124,7 @@ def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes
         count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def draw_tile_single(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
 ) -> None:

@@ -7,8 +7,8 @@ that go through L1 to L2, and on large meshes nothing else matters: setup takes 
 
 from dataclasses import replace
 
-from models.launch import Stream
-from simulator.work import Work
+from tilestamp.models.launch import Stream
+from tilestamp.simulator.work import Work
 
 PARAMETER_BYTES = 664
 VARIANT = "as published"

@@ -3,15 +3,15 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.parallel import for_parts, parts_of
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
 
 _PART_ROWS = 16  # at least
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _pixel(p0: Any, p1: Any, p2: Any, fx: Any, fy: Any) -> Any:
     """Barycentrics of vertices 0 and 1, and z/w, in float64, before clamping."""
     x0, y0 = p0[0] - fx * p0[3], p0[1] - fy * p0[3]
@@ -26,13 +26,13 @@ def _pixel(p0: Any, p1: Any, p2: Any, fx: Any, fy: Any) -> Any:
     return a0 / total, a1 / total, z / w
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _clamp(value: Any, low: Any, high: Any) -> Any:
     """Clamp, and take NaN for the lower end, as the GPU's saturation does."""
     return min(max(value, low), high) if value == value else low  # noqa: PLR0124
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _rows_part(part: int, parts: int, ids: Any, positions: Any, triangles: Any, out: Any) -> None:
     height, width = ids.shape
     corners = np.empty((3, 4), np.float64)

@@ -3,21 +3,21 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.exact import biased_exponent, float_bits, truncate_to_uint32
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import biased_exponent, float_bits, truncate_to_uint32
 
 _LOW = 0xFFFFFFFF
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def reciprocal_area(area: int) -> Any:
     """1 / area as a 24-bit mantissa and a right shift."""
     bits = float_bits(np.float32(1) / np.float32(area))
     return (bits & 0x7FFFFF) | 0x800000, 150 - (bits >> 23)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def plane_equation(
     u0: Any,
     u1: Any,

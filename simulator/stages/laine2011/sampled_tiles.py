@@ -7,19 +7,19 @@ dealt to the tile in the proportion in which its box lies there.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.laine2011.coarse_raster import TileQueues
-from simulator.stages.laine2011.fine_raster_queue import TILE
-from simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 UNITS = 16  # of headers, a pixel
 _PART_TILES = 256  # that one call of the worker takes, at least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _deal(part: int, parts: int, headers: Any, starts: Any, entries: Any, size: Any, area: Any) -> None:
     """Areas of one part of the tiles, in pixels; ``size`` is tiles along x, half width and half height in units."""
     side = UNITS * TILE

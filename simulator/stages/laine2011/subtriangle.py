@@ -4,10 +4,10 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.laine2011.exact import fma, round_to_int32, round_to_uint32, wrap_int32
-from simulator.stages.laine2011.plane_equation import plane_equation
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import fma, round_to_int32, round_to_uint32, wrap_int32
+from tilestamp.simulator.stages.laine2011.plane_equation import plane_equation
 
 SUBPIXELS = 16  # snapped positions are multiples of 1/16 pixel
 DEPTH_ERROR = 2200  # largest error of an evaluated depth plane, in depth units, at one sample a pixel
@@ -55,7 +55,7 @@ class Corner(NamedTuple):
     sy: int
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     """Project a clip position to the screen and round it to 1/16 pixel."""
     inverse = np.float32(1) / w
@@ -64,20 +64,20 @@ def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     return Corner(x, y, z, w, u, v, inverse, sx, sy)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def snapped_area(a: Corner, b: Corner, c: Corner) -> Any:
     """Twice the area in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it."""
     return wrap_int32((b.sx - a.sx) * (c.sy - a.sy) - (b.sy - a.sy) * (c.sx - a.sx))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _holds_site(a: Corner, b: Corner, c: Corner, x: int, y: int, sign: int) -> Any:
     ax, ay, bx, by, cx, cy = a.sx - x, a.sy - y, b.sx - x, b.sy - y, c.sx - x, c.sy - y
     ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> Any:
     """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
     q = SUBPIXELS >> view.log_samples
@@ -96,7 +96,7 @@ def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> 
     return not _holds_site(a, b, c, hix - bx, hiy - by, sign), 2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
     """Outcome of the culls that follow snapping, the signed area, and the sample sites that were looked at."""
     area = snapped_area(a, b, c)
@@ -106,7 +106,7 @@ def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
     return 2 if between else 0, area, sites
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _flips(a: Corner, b: Corner) -> Any:
     """How the coverage table is turned for the edge a -> b (bits: flip y, flip x, swap, complement)."""
     dx, dy = b.sx - a.sx, b.sy - a.sy
@@ -120,18 +120,18 @@ def _flips(a: Corner, b: Corner) -> Any:
     return flips
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _lesser(a: Any, b: Any) -> Any:
     """Minimum that ignores NaN, as CUDA's does."""
     return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _depth_at(a: Corner) -> Any:
     return fma(a.z * _DEPTH_SCALE, a.inverse_w, _DEPTH_BASE)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
     headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)
@@ -144,7 +144,7 @@ def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc
     misc[slot] = np.uint32(word)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def store_depth_plane(
     a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
 ) -> None:
@@ -161,7 +161,7 @@ def store_depth_plane(
         planes[slot, 3] = np.uint32(min(slope << (s - 1), _LOW))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _store_plane(
     u0: Any,
     u1: Any,
@@ -183,7 +183,7 @@ def _store_plane(
     planes[slot, at], planes[slot, at + 1], planes[slot, at + 2] = np.uint32(x), np.uint32(y), np.uint32(base)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def store_attribute_planes(
     a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
 ) -> None:

@@ -7,16 +7,16 @@ Two published releases: "1.1" (Laine & Karras 2011) has a guard band in x and y 
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.borrow import borrow
-from simulator.stages.laine2011.subtriangle import View
-from simulator.stages.laine2011.triangle_setup_count import (
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.borrow import borrow
+from tilestamp.simulator.stages.laine2011.subtriangle import View
+from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
     HEADER_BYTES,
     INDEX_BYTES,
     POSITION_BYTES,
@@ -26,7 +26,7 @@ from simulator.stages.laine2011.triangle_setup_count import (
     count_warp,
     new_counting,
 )
-from simulator.stages.laine2011.triangle_setup_paths import (
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
     CLIPPED,
     OUTSIDE,
     Scratch,
@@ -36,7 +36,7 @@ from simulator.stages.laine2011.triangle_setup_paths import (
     load_corners,
     new_scratch,
 )
-from simulator.work import Work
+from tilestamp.simulator.work import Work
 
 POSITIONS_A_SECTOR = 2  # vertices of 16 bytes in the 32 that a cache fetches
 Release = Literal["1.1", "nvdiffrast"]
@@ -51,7 +51,7 @@ SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64
 _PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _setup_range(
     begin: int,
     end: int,
@@ -92,7 +92,7 @@ def _setup_range(
             count_warp(row, allocating, counting, triangles, warp, last - warp, view, out, simt)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _setup_part(
     part: int, parts: int, positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any
 ) -> None:
@@ -105,7 +105,7 @@ def _setup_part(
     scratch.steps[0] = counting.value[0] = 0  # the owners live to here
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out: Setup) -> None:
     """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
     scratch = new_scratch()

@@ -4,13 +4,13 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import transactions
-from models.simt import Simt
-from simulator.stages.laine2011.subtriangle import View
-from simulator.stages.laine2011.triangle_setup_paths import CLIPPED, OUTSIDE, WARP, Setup
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.laine2011.subtriangle import View
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import CLIPPED, OUTSIDE, WARP, Setup
 
 INDEX_BYTES, POSITION_BYTES, HEADER_BYTES = 12, 16, 16
 RECORD_PARTS = 4  # of 16 bytes, in release 1.1
@@ -73,7 +73,7 @@ class Counting(NamedTuple):
     regular: NDArray[np.int64]  # (12, 2) transactions and bytes of accesses that are the same for all full warps
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_counting() -> Any:
     """Allocate what one worker counts with."""
     i64 = np.int64
@@ -83,7 +83,7 @@ def new_counting() -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, steps: Any) -> None:
     """Count one thread; ``counting.longest`` holds the warp's maxima so far."""
     row[_E.TRIANGLE_LANES] += 1
@@ -110,7 +110,7 @@ def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, 
         longest[i] = max(longest[i], value[i])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_paths(paths: Any, corners: Any, in_range: bool, outcome: int, sites: int, steps: Any) -> None:
     """Note the branches of one thread: first vertex outside, culled, one site, two, clips along x, y, z, no clip."""
     w = corners[0, 3]
@@ -124,7 +124,7 @@ def count_paths(paths: Any, corners: Any, in_range: bool, outcome: int, sites: i
             paths[4 + axis] += steps[2 * axis] > 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _address_lanes(access: int, counting: Counting, triangles: Any, t0: int, n: int, view: View, out: Setup) -> Any:
     """Find the addresses of an access by n lanes from triangle t0 on; returns bytes a lane, 0 where it is left out.
 
@@ -155,7 +155,7 @@ def _address_lanes(access: int, counting: Counting, triangles: Any, t0: int, n: 
     return HEADER_BYTES
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_warp(
     row: Any, allocating: int, counting: Counting, triangles: Any, t0: int, n: int, view: View, out: Setup, simt: Simt
 ) -> None:

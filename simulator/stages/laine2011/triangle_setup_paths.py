@@ -3,12 +3,12 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from simulator.stages.laine2011.clipper import MAX_VERTICES, between, clip_triangle
-from simulator.stages.laine2011.plane_equation import reciprocal_area
-from simulator.stages.laine2011.subtriangle import (
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.clipper import MAX_VERTICES, between, clip_triangle
+from tilestamp.simulator.stages.laine2011.plane_equation import reciprocal_area
+from tilestamp.simulator.stages.laine2011.subtriangle import (
     Corner,
     View,
     cull,
@@ -49,7 +49,7 @@ class Scratch(NamedTuple):
     steps: NDArray[np.int64]  # (6,) vertices walked at each clip plane
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_scratch() -> Any:
     """Allocate the working memory of one worker."""
     f32 = np.float32
@@ -59,13 +59,13 @@ def new_scratch() -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _beyond(x0: Any, w0: Any, x1: Any, w1: Any, x2: Any, w2: Any) -> Any:
     """Whether three corners lie beyond one of the two view planes of an axis."""
     return (w0 < x0 and w1 < x1 and w2 < x2) or (w0 < -x0 and w1 < -x1 and w2 < -x2)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _outside(c: Any) -> Any:
     """Whether all corners lie beyond one view plane (only looked at where the first corner is outside)."""
     w0, w1, w2 = c[0, 3], c[1, 3], c[2, 3]
@@ -78,7 +78,7 @@ def _outside(c: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _inside(clip: Any, first_axis: Any) -> Any:
     """Whether no corner leaves the frustum along the axes from ``first_axis`` on; a NaN among numbers is ignored."""
     for k in range(3):
@@ -94,13 +94,13 @@ def _inside(clip: Any, first_axis: Any) -> Any:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _in_guard_band(a: Corner, b: Corner, c: Corner) -> Any:
     low, high = min(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy), max(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy)
     return low >= -GUARD_BAND - 1 and high <= GUARD_BAND and high - low <= GUARD_BAND
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _store(
     a: Corner, b: Corner, c: Corner, area: int, view: View, out: Setup, slot: int, t: int, triangles: Any
 ) -> None:
@@ -121,7 +121,7 @@ def _store(
         out.planes[slot, 13 + k] = np.uint32(triangles[t, k])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
     u, v = polygon[i, 0], polygon[i, 1]
     x, y = between(clip[0, 0], clip[1, 0], clip[2, 0], u, v), between(clip[0, 1], clip[1, 1], clip[2, 1], u, v)
@@ -129,7 +129,7 @@ def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
     return snap(x, y, z, w, u, v, view)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
     """Count the surviving triangles of a clipped polygon; from ``slot`` on, where not negative, write them."""
     kept = 0
@@ -147,7 +147,7 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def load_corners(positions: Any, triangles: Any, t: int, clip: Any) -> Any:
     """Fetch the three corners; False where an index is out of range."""
     for k in range(3):
@@ -159,7 +159,7 @@ def load_corners(positions: Any, triangles: Any, t: int, clip: Any) -> Any:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fast_path(clip: Any, view: View, out: Setup, t: int, triangles: Any) -> Any:
     """Outcome of a triangle that needs no clipping (CLIPPED where it does), and the sample sites looked at.
 
@@ -181,7 +181,7 @@ def fast_path(clip: Any, view: View, out: Setup, t: int, triangles: Any) -> Any:
     return outcome, sites
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def clip_and_store(scratch: Scratch, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
     """Clip one triangle and write what survives (a single survivor to the own slot); returns survivors and fan size."""
     clip, polygon = scratch.clip, scratch.polygon

@@ -17,18 +17,24 @@ either: where several triangles share the least depth of a pixel, the least payl
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.atomics import CHUNK_BYTES
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Coalescing, Simt
-from simulator.parallel import for_parts
-from simulator.stages.liu2010.freepipe_events import FreePipeEvent
-from simulator.stages.liu2010.freepipe_triangle import SUBPIXEL_BITS, Pieces, _fixed_depth, _start_edges, make_pieces
-from simulator.stages.liu2010.freepipe_warp import WARP, FrameShape, _blocks
-from simulator.work import Work
+from tilestamp.models.atomics import CHUNK_BYTES
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
+    SUBPIXEL_BITS,
+    Pieces,
+    _fixed_depth,
+    _start_edges,
+    make_pieces,
+)
+from tilestamp.simulator.stages.liu2010.freepipe_warp import WARP, FrameShape, _blocks
+from tilestamp.simulator.work import Work
 
 Packing = Literal["64", "32"]
 BLOCK = 256  # threads
@@ -48,7 +54,7 @@ class FreePipeFrame(NamedTuple):
     mixed: NDArray[np.bool_]  # (H, W) the halves of the colour come from two fragments
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
     """Draw all triangles to a share of the rows, in input order.
 
@@ -86,7 +92,7 @@ def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
                 row_depth += pieces.depth[p, 2] * sixteen
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _keep_least(frame, tied, y, x, depth, payload):
     value = (depth << np.uint64(32)) | payload
     old = frame[y, x, 0]
@@ -96,7 +102,7 @@ def _keep_least(frame, tied, y, x, depth, payload):
             frame[y, x, 0] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _keep_halves(frame, halves, tied, y, x, depth, t, colors):
     """Both words, and beside them the least of depth, colour and triangle: what one wide word would hold."""
     color = np.uint64(colors[t])

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
 
 
 def pixel_colors(

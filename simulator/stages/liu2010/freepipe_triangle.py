@@ -8,12 +8,12 @@ operations of the source; a compiler that contracts differently moves its last b
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.laine2011.exact import fma, round_to_int32
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.laine2011.exact import fma, round_to_int32
 
 NOTHING, INSIDE, CLIPPED = 0, 1, 2  # what a thread does with its triangle
 PLANES = 6
@@ -34,14 +34,14 @@ class Pieces(NamedTuple):
     depth: NDArray[np.float32]  # (P, 3) NDC depth at the first pixel's centre, its slopes a sub-pixel in x and y
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _distance(p, plane):
     """Signed distance to a clip plane, in the order +x -x +y -y +z -z."""
     c = p[plane // 2]
     return p[3] + c if plane % 2 == 0 else p[3] - c
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _is_inside(p):
     largest = _F0  # the maximum of magnitudes, which ignores a NaN
     for c in range(3):
@@ -51,14 +51,14 @@ def _is_inside(p):
     return p[3] >= largest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _copy(source, target):
     """Copy a position; an assignment of slices would compile five seconds longer."""
     for c in range(4):
         target[c] = source[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _clip(polygon, spare):
     """Clip a triangle by all six planes in turn; returns the polygon's vertices."""
     n = 3
@@ -85,7 +85,7 @@ def _clip(polygon, spare):
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _classify(polygon, spare):
     """Clip in place; returns what the thread does and how many pieces it scans."""
     if _is_inside(polygon[0]) and _is_inside(polygon[1]) and _is_inside(polygon[2]):
@@ -100,14 +100,14 @@ def _classify(polygon, spare):
     return CLIPPED, max(_clip(polygon, spare) - 2, 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _pixels(a, b, c, bits, size):
     """First and last pixel whose centre lies between the least and the largest of three coordinates."""
     half = 1 << (bits - 1)
     return max((min(a, b, c) + half - 1) >> bits, 0), min((max(a, b, c) - half) >> bits, size - 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _piece(vertices, width, height, bits, corner, box, depth):
     """Project and snap three clip positions, and find box and depth plane; returns which way it faces."""
     half = 1 << (bits - 1)
@@ -140,7 +140,7 @@ def _piece(vertices, width, height, bits, corner, box, depth):
     return facing
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces):
     """Clip triangle t and count its pieces; write them where ``pieces`` is given."""
     for k in range(3):
@@ -155,14 +155,14 @@ def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, p
     return kind, n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _classify_part(part, parts, positions, triangles, kind, count):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     for t in range(kind.size * part // parts, kind.size * (part + 1) // parts):
         kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, polygon, spare, polygon, None)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _project_part(part, parts, positions, triangles, width, height, bits, pieces):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     fan = np.empty((3, 4), np.float32)
@@ -170,7 +170,7 @@ def _project_part(part, parts, positions, triangles, width, height, bits, pieces
         _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _start_edges(corner, bits, x, y, edge):
     """Edge functions at the centre of pixel (x, y), less one where the edge does not own its points."""
     half = np.int64(1) << (bits - 1)
@@ -183,7 +183,7 @@ def _start_edges(corner, bits, x, y, edge):
         edge[3 + 2 * k], edge[4 + 2 * k] = dx << bits, dy << bits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fixed_depth(z):
     """NDC depth to 32 bits of fixed point, 0 nearest."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)

@@ -8,13 +8,19 @@ clipping go first; then the others scan the triangles of their clipped polygons,
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.atomics import CHUNK_BYTES, SECTOR
-from models.coalescing import transactions
-from simulator.stages.liu2010.freepipe_events import FreePipeEvent
-from simulator.stages.liu2010.freepipe_triangle import CLIPPED, INSIDE, SUBPIXEL_BITS, _fixed_depth, _start_edges
+from tilestamp.models.atomics import CHUNK_BYTES, SECTOR
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
+    CLIPPED,
+    INSIDE,
+    SUBPIXEL_BITS,
+    _fixed_depth,
+    _start_edges,
+)
 
 WARP = 32
 INDEX_BYTES = 4
@@ -40,7 +46,7 @@ class Lanes(NamedTuple):
     slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _new_lanes():
     return Lanes(
         np.empty(WARP, np.int64),
@@ -59,7 +65,7 @@ def _new_lanes():
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_vertices(triangles, t0, lanes, simt, address, row):
     """Count loads of three indices and three positions a lane."""
     for k in range(3):
@@ -73,7 +79,7 @@ def _count_vertices(triangles, t0, lanes, simt, address, row):
         row[FreePipeEvent.LOAD_BYTES] += size + more_size
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _start_rows(pieces, lanes):
     """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
     active, boxes, most = 0, 0, 0
@@ -90,7 +96,7 @@ def _start_rows(pieces, lanes):
     return active, boxes, most
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _start_row(pieces, lanes, r, width, unroll):
     """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
 
@@ -114,7 +120,7 @@ def _start_row(pieces, lanes, r, width, unroll):
     return active, rest, turns
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
     """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
 
@@ -146,7 +152,7 @@ def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
     return stay, tests, hits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _early(lanes, hits, t0, frame, word_bytes, simt, row):
     """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
     count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
@@ -165,7 +171,7 @@ def _early(lanes, hits, t0, frame, word_bytes, simt, row):
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _slot(seen, most, key):
     """Place of a key in a hash table; a new one begins with 0."""
     i = key & (_SLOTS - 1)
@@ -177,9 +183,9 @@ def _slot(seen, most, key):
     return i
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_atomics(lanes, hits, shape, merge, row, chunks):
-    """One instruction on each plane of the frame buffer, by the rules of ``models.atomics``.
+    """One instruction on each plane of the frame buffer, by the rules of ``tilestamp.models.atomics``.
 
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
     """
@@ -205,7 +211,7 @@ def _count_atomics(lanes, hits, shape, merge, row, chunks):
     row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
     """Scan the lanes' pieces in lockstep; returns the steps, the rows, and the steps that hit."""
     active, boxes, rows = _start_rows(pieces, lanes)
@@ -246,7 +252,7 @@ class FrameShape(NamedTuple):
     unroll: int  # pixels in a turn of the inner loop
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, frame):
     """One warp, triangles t0..t0+lanes_in-1; returns its steps, its rows, and its steps that hit."""
     row[FreePipeEvent.WARPS] += 1
@@ -278,7 +284,7 @@ def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, fram
     return steps, rows, hit_steps
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
     """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
     lanes = _new_lanes()

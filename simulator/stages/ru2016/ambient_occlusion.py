@@ -8,17 +8,17 @@ the screen: it does not depend on the scene. The sample pattern, the radius and 
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.ru2016.fragment_shading import Fragments
-from simulator.stages.ru2016.fragment_shading_work import BLOCK
-from simulator.stages.ru2016.vertex_shading import EyeSpace
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
+from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
+from tilestamp.simulator.stages.ru2016.vertex_shading import EyeSpace
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 SAMPLES = 64
 NOISE = 4  # pixels on a side of the noise texture
@@ -46,7 +46,7 @@ def noise() -> NDArray[np.float32]:
     return np.stack([np.cos(2.0 * np.pi * order), np.sin(2.0 * np.pi * order)], axis=2).astype(np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int, y: int, radius: Any) -> int:
     """Count the samples of one pixel that lie behind what is drawn there."""
     height, width = w.shape
@@ -77,7 +77,7 @@ def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int,
     return occluded
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, y: int, light: Any) -> None:
     for x in range(w.shape[1]):
         if w[y, x] > _ZERO:
@@ -86,7 +86,7 @@ def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: 
             light[y, x] = _ONE - np.float32(found) / np.float32(len(samples))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _ambient_occlusion(
     part: int, parts: int, w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, light: Any
 ) -> None:

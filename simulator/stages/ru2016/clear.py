@@ -3,10 +3,10 @@
 A tile writes every fragment and depth of its pixels, so the tiled path has nothing else to clear.
 """
 
-from models.simt import Simt
-from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads of the runtime's memset, four words each (assumed)
 

@@ -8,19 +8,19 @@ the eye; nearest or bilinear filtering. Kernels of 8x8 threads.
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.scenes.texture import TextureChains, add_bilinear, nearest
-from simulator.scenes.textured_mesh import Geometry
-from simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
-from simulator.stages.ru2016.tiled_raster import Visible
-from simulator.stages.ru2016.triangle import area, barycentric, corners
-from simulator.stages.ru2016.vertex_shading import ShadedVertices
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.scenes.texture import TextureChains, add_bilinear, nearest
+from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
+from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners
+from tilestamp.simulator.stages.ru2016.vertex_shading import ShadedVertices
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 AMBIENT = np.float32(0.2)
 DIFFUSE = np.float32(0.8)
@@ -50,7 +50,7 @@ class Fragments(NamedTuple):
     w: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: bool) -> tuple[Any, Any, Any, Any]:
     """Weights of a triangle's corners at a point of the screen, and the interpolated w."""
     x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
@@ -63,7 +63,7 @@ def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: 
     return a, b, c, w
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _interpolate_row(
     screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any, visible: Any, y: int,
     perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -89,7 +89,7 @@ def _interpolate_row(
         depths[y, x] = w
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _interpolate(
     part: int, parts: int, screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any,
     visible: Any, perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -123,7 +123,7 @@ def interpolate(mesh: Geometry, vertices: ShadedVertices, visible: Visible, *, p
     return fragments
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _shade_row(
     visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any, colors: Any, light: Any,
     y: int, out: Any,
@@ -146,7 +146,7 @@ def _shade_row(
             out[y, x, c] = np.uint8(min(max(value, _ZERO), _ONE) * np.float32(255.0) + _HALF)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _shade(
     part: int, parts: int, visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any,
     colors: Any, light: Any, out: Any,

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.scenes.texture import TextureChains
-from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
-from simulator.stages.thread_per_item import Access, record_transactions
-from simulator.work import Work
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes.texture import TextureChains
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
+from tilestamp.simulator.stages.thread_per_item import Access, record_transactions
+from tilestamp.simulator.work import Work
 
 SIDE = 8  # threads
 BLOCK = SIDE * SIDE

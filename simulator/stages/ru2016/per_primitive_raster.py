@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
-from simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
-from simulator.stages.ru2016.tile_lists import SECTOR_BYTES
-from simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
-from simulator.work import Work
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
+from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
+from tilestamp.simulator.work import Work
 
 START_LOADS = 9  # x, y and z of three vertices
 HIT_LOADS = 3  # w of three vertices, again at each hit: the stores between may have changed it

@@ -3,12 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from models.atomics import add_requests, count_atomics
-from simulator.stages.borrow import borrow, row_of
-from simulator.stages.ru2016.per_primitive_warps import BLOCK
-from simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
+from tilestamp.models.atomics import add_requests, count_atomics
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.borrow import borrow, row_of
+from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
 
 RACE_ROUNDS = 3  # assumed
 DEPTH_SCALE = np.float64(2**31 - 1)  # depths are compared as integers
@@ -18,7 +18,7 @@ _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events: Any) -> None:
     """All waves of resident warps.
 
@@ -42,7 +42,7 @@ def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events:
         rounds = _wave(borrow(mesh), first, end, culling, merge, warps, borrow(buffers), rounds, borrow(events))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _wave(
     mesh: Any, first: int, end: int, culling: bool, merge: int, warps: Any, buffers: Any, rounds: int, events: Any
 ) -> Any:
@@ -87,7 +87,7 @@ def _wave(
     return rounds + s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _column(boxes: Any, w: int, column: int, place: Any, present: Any) -> None:
     """Begin a column of a warp's boxes: it takes the rows of the highest box that has the column; none at the end."""
     rows = 0
@@ -103,7 +103,7 @@ def _column(boxes: Any, w: int, column: int, place: Any, present: Any) -> None:
     place[w, 3] = lanes
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, first: int, shape: Any, culling: bool, boxes: Any, shapes: Any, row: Any
 ) -> None:
@@ -137,7 +137,7 @@ def _boxes(
         row[0] += 1  # WARPS
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _step(
     shapes: Any, boxes: Any, w: int, place: Any, present: Any, nearest: Any, depth: Any, pixels: Any, who: Any,
     wins: Any, row: Any,
@@ -178,7 +178,7 @@ def _step(
     return hits
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _write(boxes: Any, w: int, pixels: Any, who: Any, wins: Any, raced: Any, landed: Any, lands: int, row: Any) -> int:
     """Lanes that lowered the depth put their fragment, which lands in round ``lands``; 1 if there are any."""
     written = 0
@@ -196,7 +196,7 @@ def _write(boxes: Any, w: int, pixels: Any, who: Any, wins: Any, raced: Any, lan
     return min(written, 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _count_atomics(pixels: Any, merge: int, row: Any, requests: Any) -> None:
     for i in range(len(pixels)):
         pixels[i] *= 4  # bytes

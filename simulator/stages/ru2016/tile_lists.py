@@ -13,12 +13,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
-from simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
+from tilestamp.simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 SCAN_BLOCK = 256  # threads (ours: the original has no scan)
 SMALL_MODEL = 100  # triangles up to which a list can hold all of them

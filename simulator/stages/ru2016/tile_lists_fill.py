@@ -4,11 +4,11 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from models.atomics import add_requests, count_atomics
-from models.coalescing import transactions
-from simulator.stages.ru2016.triangle import area, corners, pixel_box
+from tilestamp.models.atomics import add_requests, count_atomics
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.ru2016.triangle import area, corners, pixel_box
 
 BLOCK = 128  # threads
 COUNTER_WORD = 4  # bytes of a tile's counter, and of a list entry
@@ -38,7 +38,7 @@ class TileListEvent(IntEnum):
     LONGEST_APPENDS = 17  # most steps of a warp in which a lane appends, and waits for its place
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> bool:
     """Whether a triangle and a square tile overlap: no axis of five separates them (touching counts)."""
     right = left + size
@@ -54,7 +54,7 @@ def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, to
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _separates(
     ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, left: Any, top: Any, right: Any, bottom: Any
 ) -> Any:
@@ -69,7 +69,7 @@ def _separates(
     return min(x[0], x[1]) + min(y[0], y[1]) > _ZERO
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def fill(
     screen: Any, triangles: Any, drawable: Any, width: int, height: int, tile: int, culling: bool, warp: int,
     rule: int, merge: int, room: int, limits: Any, sizes: Any, entries: Any, requests: Any, events: Any,
@@ -108,7 +108,7 @@ def fill(
     return lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _columns(boxes: Any, y: int) -> int:
     """Steps of a warp over row y of its lanes' boxes: those of the widest that has the row."""
     columns = 0
@@ -118,7 +118,7 @@ def _columns(boxes: Any, y: int) -> int:
     return columns
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _append(
     screen: Any, triangles: Any, boxes: Any, x: int, y: int, width: int, tile: int, room: int, limits: Any,
     sizes: Any, entries: Any, addresses: Any, places: Any,
@@ -154,7 +154,7 @@ def _append(
     return appended, lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, first: int, width: int, height: int, tile: int, culling: bool,
     boxes: Any, events: Any,
@@ -188,7 +188,7 @@ def _boxes(
     return most
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _count_append(addresses: Any, places: Any, warp: int, rule: int, merge: int, row: Any, requests: Any) -> None:
     """Count one warp's atomicAdd on the counters and the stores of the entries."""
     lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)

@@ -13,16 +13,16 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.coalescing import transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
-from simulator.stages.ru2016.triangle import area, barycentric, corners, inside
-from simulator.work import Work
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
+from tilestamp.simulator.work import Work
 
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
 FRAGMENT_WORDS = 11  # of 4 bytes, stored one by one
@@ -72,7 +72,7 @@ class Visible(NamedTuple):
     depth: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _tile(
     screen: Any, triangles: Any, entries: Any, x_first: int, y_first: int, tile: int, warp: int,
     visible: Any, depth: Any, marks: Any, row: Any,
@@ -110,7 +110,7 @@ def _tile(
                     marks[k, w] = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _band(
     screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int, visible: Any, depth: Any,
     tile_row: int, events: Any,
@@ -135,7 +135,7 @@ def _band(
             marks[:] = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _tiled_raster(
     part: int, parts: int, screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int,
     visible: Any, depth: Any, events: Any,

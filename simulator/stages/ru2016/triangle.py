@@ -3,26 +3,27 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from tilestamp.models.kernel import kernel
 
 _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def corners(screen: Any, triangles: Any, t: int) -> tuple[Any, Any, Any, Any, Any, Any]:
     """Screen coordinates of a triangle's corners: x0, y0, x1, y1, x2, y2."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     return screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1], screen[c, 0], screen[c, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def area(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any) -> Any:
     """Twice the signed area; positive where the corners run counter-clockwise on a screen whose y points down."""
     return (x2 - x0) * (y1 - y0) - (x1 - x0) * (y2 - y0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def barycentric(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, inverse: Any, px: Any, py: Any
 ) -> tuple[Any, Any, Any]:
@@ -32,13 +33,13 @@ def barycentric(
     return _ONE - b - c, b, c
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def inside(a: Any, b: Any, c: Any) -> Any:
     """Whether all three lie in [0, 1]: edges belong to both neighbours, as in the original."""
     return a >= _ZERO and b >= _ZERO and c >= _ZERO and a <= _ONE and b <= _ONE and c <= _ONE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def pixel_box(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
 ) -> tuple[int, int, int, int]:

@@ -12,13 +12,13 @@ row 0 is the right axis, row 1 the up axis and row 3 the forward axis, each time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.scenes.textured_mesh import Geometry
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 BLOCK = 128  # threads
 VERTEX_BYTES = 64  # position, eye position, eye normal, texture coordinate, texture pointer and size
@@ -67,7 +67,7 @@ def eye_space(matrix: NDArray[Any]) -> EyeSpace:
     return EyeSpace(axes.astype(np.float32), np.where(scales > 1e-12, scales, 0.0).astype(np.float32))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _vertex_shading(
     positions: Any, normals: Any, matrix: Any, axes: Any, width: Any, height: Any, screen: Any, eye_normals: Any
 ) -> None:

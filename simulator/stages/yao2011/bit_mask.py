@@ -16,18 +16,24 @@ from enum import IntEnum
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
-from models.atomics import count_atomics
-from models.coalescing import contiguous
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
-from simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, count_hits, keep_nearest, pixel_box
-from simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from simulator.stages.yao2011.bit_mask_words import new_mask, next_word, patch_box
-from simulator.work import Work
+from tilestamp.models.atomics import count_atomics
+from tilestamp.models.coalescing import contiguous
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    blocks,
+    count_hits,
+    keep_nearest,
+    pixel_box,
+)
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.yao2011.bit_mask_words import new_mask, next_word, patch_box
+from tilestamp.simulator.work import Work
 
 MaskKind = Literal["plain", "facing", "depth"]
 KINDS = ("plain", "facing", "depth")
@@ -108,7 +114,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _bit_mask(vertices, starts, samples, kind, in_flight, simt, table):
     """One patch after another; ``kind`` is 0 plain, 1 facing, 2 depth."""
     lanes = (
@@ -139,7 +145,7 @@ def _bit_mask(vertices, starts, samples, kind, in_flight, simt, table):
                 pass
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _take(vertices, first, last, kind, samples, lanes, row):
     """Set up the next polygons, a lane each."""
     edges, boxes, depths, snapped, walk, polygon = lanes
@@ -157,7 +163,7 @@ def _take(vertices, first, last, kind, samples, lanes, row):
         walk[lane, 7] = 1 if kind == 1 and area < 0 else 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
     """Every lane finds its next clear sample and tests it; returns whether any lane had one."""
     edges, _, depths, _, walk, polygon = lanes
@@ -207,7 +213,7 @@ def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
     return active > 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write_mask(mask, words, bits, hits, shared, row):
     """One atomic or of the warp."""
     flat = mask.reshape(-1)

@@ -1,15 +1,15 @@
 """The words of a patch's bit mask: rows of the patch's box, the samples of a row next to each other, 32 to a word."""
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.fatahalian2009.micropolygon_cover import snap
-from simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import snap
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
 
 WORD = 32  # bits
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def patch_box(vertices, first, last, boxes, snapped, samples):
     """Pixels (x0, y0, x1, y1) of a patch's polygons that are on screen; dicing knows the box, so nothing is counted."""
     low_x, low_y, high_x, high_y = samples.width, samples.height, -1, -1
@@ -22,7 +22,7 @@ def patch_box(vertices, first, last, boxes, snapped, samples):
     return low_x, low_y, high_x, high_y
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_mask(box, spp, layers, with_depth):
     """Make a clear mask (layers, rows, words), and the patch's nearest depths (rows, samples) where they are kept."""
     rows = box[3] - box[1] + 1
@@ -31,7 +31,7 @@ def new_mask(box, spp, layers, with_depth):
     return np.zeros((layers, rows, words), np.uint32), np.full((kept, words * WORD), np.inf, np.float32)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
     """Read words until one has a sample to test, or the lane's box ends; returns words read, depths looked up.
 
@@ -64,7 +64,7 @@ def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
     return reads, looked
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _front(depths):
     """Nearest vertex of a polygon: no depth in it is less, even rounded; a triangle repeats vertex 0 in row 1."""
     return np.float32(min(depths[0, 0], depths[0, 1], depths[0, 2], depths[1, 2]))

@@ -3,21 +3,22 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from tilestamp.models.kernel import kernel
 
 PLANES = 6
 MOST_VERTICES = 12  # 9, since a triangle gains one for each plane; rounding of slivers may find more crossings
 _ZERO = np.float32(0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def distance(vertex: Any, plane: int) -> Any:
     """How far a vertex (x, y, z, w, ...) is inside a plane: w + x, w - x, w + y, w - y, w + z, w - z."""
     axis = vertex[plane // 2]
     return vertex[3] + axis if plane % 2 == 0 else vertex[3] - axis
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def outcode(vertex: Any) -> int:
     """Bit p: the vertex is outside of plane p."""
     code = 0
@@ -27,7 +28,7 @@ def outcode(vertex: Any) -> int:
     return code
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def clip_polygon(polygon: Any, scratch: Any, count: int) -> int:
     """Clip ``polygon``, (12, n), in place; returns its vertices, 0 where nothing is left."""
     for plane in range(PLANES):

@@ -4,11 +4,11 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.zhang2025.depth import NO_DEPTH, depth_24_bit
-from simulator.stages.zhang2025.primitive_binning import BIN
-from simulator.stages.zhang2025.triangle_setup import DEPTH
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.zhang2025.depth import NO_DEPTH, depth_24_bit
+from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN
+from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH
 
 BLOCK = 256  # threads, and primitives a round
 TILE = 8  # pixels
@@ -47,7 +47,7 @@ class CoarseRasterizerEvent(IntEnum):
     CRITICAL_APPEND_STEPS = 24  # the same of the appends
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _corner(edge: Any, left: Any, bottom: Any, far: bool) -> Any:
     """Evaluate an edge function at the tile's corner that lies farthest inside, or farthest outside."""
     side = np.float32(TILE)
@@ -56,7 +56,7 @@ def _corner(edge: Any, left: Any, bottom: Any, far: bool) -> Any:
     return edge[0] * x + edge[1] * y + edge[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _depth_range(plane: Any, left: Any, bottom: Any) -> tuple[int, int]:
     """Least and greatest depth of a plane over a tile, in 24 bits."""
     side = np.float32(TILE)
@@ -65,7 +65,7 @@ def _depth_range(plane: Any, left: Any, bottom: Any) -> tuple[int, int]:
     return depth_24_bit(min(x0, x1) + min(y0, y1) + plane[2]), depth_24_bit(max(x0, x1) + max(y0, y1) + plane[2])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _tile_of_warp(
     edges: Any, planes: Any, boxes: Any, listed: Any, left: Any, bottom: Any, hi_z: Any, tile: int, masks: Any, row: Any
 ) -> None:
@@ -107,7 +107,7 @@ def _tile_of_warp(
     row[12] += max(0, updates - 1)  # BANK_REPLAYS: one address
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def rasterize_bin(
     edges: Any, planes: Any, boxes: Any, queue: Any, origin_x: int, origin_y: int, warp: int, use_hi_z: bool,
     counts: Any, entries: Any, cursors: Any, row: Any,
@@ -145,7 +145,7 @@ def rasterize_bin(
         slowest = max(slowest, row[5] - before)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _tiles_of(boxes: Any, listed: Any, origin_x: int, origin_y: int) -> tuple[int, int, int, int]:
     """Tiles of the bin that the boxes of a warp's primitives span: the others fail every box test."""
     low_x, low_y, high_x, high_y = TILES_A_ROW - 1, TILES_A_ROW - 1, 0, 0

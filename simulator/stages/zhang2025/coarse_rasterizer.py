@@ -12,16 +12,16 @@ where the stored depth is not greater; here by a margin of 4 units of 24 bits, s
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts
-from simulator.stages.zhang2025.coarse_bin import BLOCK, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
-from simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
-from simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stages.zhang2025.coarse_bin import BLOCK, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
+from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
+from tilestamp.simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
+from tilestamp.simulator.work import Work
 
 CHUNK = 512  # queue entries
 SHARED_BYTES = 4 * (256 + 256 + 8 * 257 + 32 + 7)  # primitives, Hi-Z, masks of each warp and tile, a scan, cursors
@@ -43,7 +43,7 @@ class TileQueues(NamedTuple):
     columns: int
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _coarse_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, boxes: Any, starts: Any, queue: Any, columns: int, warp: int,
     use_hi_z: bool, counts: Any, entries: Any, cursors: Any, events: Any,

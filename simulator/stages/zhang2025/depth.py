@@ -9,9 +9,9 @@ off the depth that goes to the ROP (``biased``). With ``direct`` both evaluate t
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
 
 DEPTH_STEPS = np.float32(2**24 - 1)
 NO_DEPTH = 2**32 - 1  # cleared to
@@ -22,13 +22,13 @@ _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def depth_24_bit(z: Any) -> int:
     """Round a depth in [0, 1] as the original keeps it."""
     return int(min(max(z, _ZERO), _ONE) * DEPTH_STEPS)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def fragment_depth(planes: Any, x: int, y: int, way: int) -> Any:
     """Depth of a fragment as the ROP gets it, by one of ``FRAGMENT_DEPTHS``."""
     plane = planes[DEPTH]

@@ -11,18 +11,18 @@ Lanes reach a pixel in the same step and the atomic serves them in lane order, s
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.zhang2025.coarse_bin import TILE
-from simulator.stages.zhang2025.coarse_rasterizer import TileQueues
-from simulator.stages.zhang2025.depth import NO_DEPTH
-from simulator.stages.zhang2025.fine_tile import FineRasterizerEvent, rasterize_tile
-from simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
+from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
+from tilestamp.simulator.stages.zhang2025.depth import NO_DEPTH
+from tilestamp.simulator.stages.zhang2025.fine_tile import FineRasterizerEvent, rasterize_tile
+from tilestamp.simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
+from tilestamp.simulator.work import Work
 
 TILES_A_BLOCK = 4  # after optimization
 FRAGMENT_BYTES = 48
@@ -43,7 +43,7 @@ class TileFragments(NamedTuple):
     depth: NDArray[np.uint32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _fine_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, starts: Any, entries: Any, tile_columns: int, warp: int,
     early_z: bool, optimized: bool, masks: Any, depth: Any, events: Any,

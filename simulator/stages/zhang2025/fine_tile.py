@@ -4,11 +4,11 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.zhang2025.coarse_bin import TILE
-from simulator.stages.zhang2025.depth import depth_24_bit
-from simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
+from tilestamp.simulator.stages.zhang2025.depth import depth_24_bit
+from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
 
 QUADS = 16  # of a tile
 _HALF = np.float32(0.5)
@@ -41,7 +41,7 @@ class FineRasterizerEvent(IntEnum):
     CRITICAL_QUAD_STEPS = 20
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def coverage(edges: Any, left: int, bottom: int, columns: int, rows: int) -> Any:
     """64-bit coverage of a tile by one primitive, limited to ``columns`` x ``rows`` pixels on the screen."""
     mask = np.uint64(0)
@@ -63,7 +63,7 @@ def coverage(edges: Any, left: int, bottom: int, columns: int, rows: int) -> Any
     return mask
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _early_z(plane: Any, mask: Any, left: int, bottom: int, depth: Any, hits: Any, early_z: bool) -> Any:
     """Depth-test the covered pixels of one primitive; returns those that pass."""
     passed = mask
@@ -80,7 +80,7 @@ def _early_z(plane: Any, mask: Any, left: int, bottom: int, depth: Any, hits: An
     return passed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def quad_mask(mask: Any) -> int:
     """Which of the 16 quads of a tile have a live pixel."""
     quads = 0
@@ -91,7 +91,7 @@ def quad_mask(mask: Any) -> int:
     return quads
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def rasterize_tile(
     edges: Any, planes: Any, queue: Any, left: int, bottom: int, warp: int, early_z: bool, optimized: bool,
     masks: Any, depth: Any, row: Any,
@@ -122,7 +122,7 @@ def rasterize_tile(
             row[7] += _bits(written[lane])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _bits(quads: int) -> int:
     count = 0
     while quads:
@@ -131,7 +131,7 @@ def _bits(quads: int) -> int:
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _quad_steps(written: Any, optimized: bool) -> int:
     """Warp steps that write: over 16 quads for each group of 8 lanes' primitives, or for all lanes at once."""
     group = 8 if optimized else len(written)

@@ -8,17 +8,17 @@ filtering. Every fragment, helper pixels of a quad included, links itself to its
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.scenes.texture import TEXEL_BYTES, TextureChains
-from simulator.stages.zhang2025.coarse_bin import TILE
-from simulator.stages.zhang2025.coarse_rasterizer import TileQueues
-from simulator.stages.zhang2025.fine_rasterizer import FRAGMENT_BYTES, TileFragments
-from simulator.stages.zhang2025.pixel_shader_block import (
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.scenes.texture import TEXEL_BYTES, TextureChains
+from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
+from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
+from tilestamp.simulator.stages.zhang2025.fine_rasterizer import FRAGMENT_BYTES, TileFragments
+from tilestamp.simulator.stages.zhang2025.pixel_shader_block import (
     BILINEAR,
     BLOCK,
     NEAREST,
@@ -26,8 +26,8 @@ from simulator.stages.zhang2025.pixel_shader_block import (
     PixelShaderEvent,
     shade_block,
 )
-from simulator.stages.zhang2025.triangle_setup import TriangleSetupData
-from simulator.work import Work
+from tilestamp.simulator.stages.zhang2025.triangle_setup import TriangleSetupData
+from tilestamp.simulator.work import Work
 
 OVERDRAW = 4  # fragments a pixel that the stream has room for
 FRAGMENT_OUT_BYTES = 32
@@ -53,7 +53,7 @@ class FragmentStream(NamedTuple):
     colors: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any) -> int:
     """Lay the quads out in stream order: by tile, entry, place; with ``entries`` None only count."""
     count = 0
@@ -73,7 +73,7 @@ def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _pixel_shader(
     part: int, parts: int, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any,
     method: int, opacity: Any, rule: int, colors: Any, events: Any,

@@ -4,10 +4,10 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from models.coalescing import transactions
-from simulator.scenes.texture import (
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.scenes.texture import (
     TEXEL_BYTES,
     add_bilinear,
     add_trilinear,
@@ -16,7 +16,7 @@ from simulator.scenes.texture import (
     nearest,
     texel_index,
 )
-from simulator.stages.zhang2025.triangle_setup import COLOR, NORMAL, ONE_OVER_W, UV, evaluate
+from tilestamp.simulator.stages.zhang2025.triangle_setup import COLOR, NORMAL, ONE_OVER_W, UV, evaluate
 
 BLOCK = 256  # threads
 QUADS_A_WARP = 8
@@ -48,7 +48,7 @@ class PixelShaderEvent(IntEnum):
     STORE_BYTES = 14
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def quad_coordinates(planes: Any, place: Any, uv: Any) -> None:
     """Perspective-correct texture coordinates of a quad's four pixels, (4, 2)."""
     for k in range(4):
@@ -58,7 +58,7 @@ def quad_coordinates(planes: Any, place: Any, uv: Any) -> None:
         uv[k, 1] = evaluate(planes[UV + 1], x, y) * w
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _light(planes: Any, x: Any, y: Any) -> Any:
     """Light from the eye; the factor w of the normal cancels in its direction."""
     nx, ny = evaluate(planes[NORMAL], x, y), evaluate(planes[NORMAL + 1], x, y)
@@ -67,7 +67,7 @@ def _light(planes: Any, x: Any, y: Any) -> Any:
     return AMBIENT + DIFFUSE * abs(nz) / np.sqrt(length) if length > _ZERO else _ONE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _shade_quad(
     planes: Any, chains: Any, texture: int, method: int, opacity: Any, place: Any, uv: Any, out: Any
 ) -> Any:
@@ -96,7 +96,7 @@ def _shade_quad(
     return lod
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: int, addresses: Any) -> None:
     """Byte addresses of the texels that a quad's four lanes load, ``addresses`` (8, lanes)."""
     levels = 2 if method == TRILINEAR else 1
@@ -112,7 +112,7 @@ def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: 
                 addresses[4 * n + corner, lane + k] = i * TEXEL_BYTES
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def shade_block(
     quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any, method: int,
     opacity: Any, rule: int, first: int, colors: Any, row: Any,

@@ -10,17 +10,17 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.atomics import count_atomics
-from models.coalescing import transactions
-from models.launch import Stream
-from models.simt import Simt
-from simulator.scenes.textured_mesh import Geometry
-from simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
-from simulator.stages.zhang2025.vertex_fetch_and_shading import BLOCK, VARYINGS, VERTEX_BYTES, ShadedVertices
-from simulator.work import Work
+from tilestamp.models.atomics import count_atomics
+from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
+from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import BLOCK, VARYINGS, VERTEX_BYTES, ShadedVertices
+from tilestamp.simulator.work import Work
 
 PRIMITIVE_BYTES = 112  # three vertices and an identifier
 MOST_PIECES = MOST_VERTICES - 2
@@ -65,7 +65,7 @@ class Primitives(NamedTuple):
     ids: NDArray[np.int32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _put(
     polygon: Any, a: int, b: int, c: int, width: Any, height: Any, culling: bool, screen: Any, varyings: Any
 ) -> bool:
@@ -86,7 +86,7 @@ def _put(
     return area > _ZERO or (area < _ZERO and not culling)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _primitive_assembly(
     clip: Any, varyings: Any, triangles: Any, width: Any, height: Any, culling: bool,
     screen: Any, out_varyings: Any, ids: Any, events: Any,
@@ -121,7 +121,7 @@ def _primitive_assembly(
     return used
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int, events: Any) -> None:
     """Vertex fetches through the indices, and the atomics of the clipped lanes, warp by warp."""
     addresses = np.empty(warp, np.int64)

@@ -9,15 +9,15 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.errors import TilestampError
-from models.launch import Stream
-from models.simt import Simt
-from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
-from simulator.stages.zhang2025.triangle_setup import launched_blocks
-from simulator.work import Work
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
+from tilestamp.simulator.stages.zhang2025.triangle_setup import launched_blocks
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads, and primitives a sub-queue
 BIN = 128  # pixels
@@ -59,7 +59,7 @@ class BinQueues(NamedTuple):
     entries: NDArray[np.int32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
     """First and last bin of a box in each direction."""
     left = min(max(int(box[0]) // BIN, 0), columns - 1)
@@ -69,7 +69,7 @@ def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
     return left, right, bottom, top
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: Any) -> None:
     """Entries by sub-queue and bin, ``counts`` (blocks, 256)."""
     steps = 0
@@ -85,7 +85,7 @@ def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: 
             steps = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _fill(boxes: Any, columns: int, rows: int, cursor: Any, entries: Any) -> None:
     """Write the queues; ``cursor`` (256,) runs ahead in each bin."""
     for p in range(len(boxes)):

@@ -9,13 +9,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from models.launch import Stream
-from models.machine import Machine
-from models.occupancy import residency
-from models.simt import Simt
-from simulator.stages.thread_per_item import Access, record_transactions
-from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
-from simulator.work import Work
+from tilestamp.models.launch import Stream
+from tilestamp.models.machine import Machine
+from tilestamp.models.occupancy import residency
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.thread_per_item import Access, record_transactions
+from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 REGISTERS = 40  # a thread, from his profile

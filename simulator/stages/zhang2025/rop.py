@@ -9,26 +9,26 @@ and the rest is reported, and 0 asks for no limit. Before optimization the four 
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.launch import Stream
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.zhang2025.coarse_rasterizer import TileQueues
-from simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
-from simulator.stages.zhang2025.fine_rasterizer import TileFragments
-from simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, FragmentStream
-from simulator.stages.zhang2025.rop_block import BLOCK_SIDE, RopEvent, resolve_block
-from simulator.stages.zhang2025.triangle_setup import TriangleSetupData
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
+from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
+from tilestamp.simulator.stages.zhang2025.fine_rasterizer import TileFragments
+from tilestamp.simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, FragmentStream
+from tilestamp.simulator.stages.zhang2025.rop_block import BLOCK_SIDE, RopEvent, resolve_block
+from tilestamp.simulator.stages.zhang2025.triangle_setup import TriangleSetupData
+from tilestamp.simulator.work import Work
 
 KEPT = 4  # fragments a pixel
 Order = Literal["api", "oit"]
 FragmentDepth = Literal["direct", "stepped", "biased"]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
     """Link the lists as PixelShader's atomicExch leaves them, in stream order."""
     height, width = heads.shape
@@ -40,7 +40,7 @@ def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
                 heads[y, x] = 4 * q + k
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _rop(
     part: int, parts: int, heads: Any, links: Any, quads: Any, colors: Any, masks: Any, queue: Any, planes: Any,
     ids: Any, columns: int, warp: int, order: int, way: int, limit: int, target: Any, depth: Any, winners: Any,

@@ -4,10 +4,10 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from simulator.stages.zhang2025.coarse_bin import TILE
-from simulator.stages.zhang2025.depth import fragment_depth
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
+from tilestamp.simulator.stages.zhang2025.depth import fragment_depth
 
 BLOCK_SIDE = 16  # threads
 _ONE = np.float32(1.0)
@@ -31,7 +31,7 @@ class RopEvent(IntEnum):
     HOLES = 12  # pixels whose fragments all fail the depth test
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _gather(
     head: int, links: Any, quads: Any, masks: Any, queue: Any, planes: Any, ids: Any, bit: Any, x: int, y: int,
     order: int, way: int, kept: Any, keys: Any, row: Any, lane: Any,
@@ -60,7 +60,7 @@ def _gather(
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _resolve(kept: Any, keys: Any, count: int, colors: Any, ids: Any, order: int, target: Any, pixel_depth: Any) -> int:
     """Test and blend the kept fragments; returns the triangle last written, -1 for none."""
     nearest = pixel_depth[0]
@@ -79,7 +79,7 @@ def _resolve(kept: Any, keys: Any, count: int, colors: Any, ids: Any, order: int
     return written
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def resolve_block(
     heads: Any, links: Any, quads: Any, colors: Any, masks: Any, queue: Any, planes: Any, ids: Any, left: int,
     bottom: int, warp: int, order: int, way: int, limit: int, target: Any, depth: Any, winners: Any, row: Any,

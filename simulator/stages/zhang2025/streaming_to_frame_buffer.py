@@ -6,13 +6,13 @@ After optimization a thread stores one 4-byte word, before it four single bytes.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 _ZERO = np.float32(0.0)
@@ -20,7 +20,7 @@ _ONE = np.float32(1.0)
 _FULL = np.float32(255.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _streaming(part: int, parts: int, target: Any, image: Any) -> None:
     """Convert a part of the rows, the last one first."""
     rows = len(target)

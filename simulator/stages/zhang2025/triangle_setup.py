@@ -7,15 +7,15 @@ screen coordinates, so it is large and loses bits. The original's one-pixel hole
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.parallel import for_parts, parts_of
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
-from simulator.stages.zhang2025.vertex_fetch_and_shading import VARYINGS
-from simulator.work import Work
+from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
+from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import VARYINGS
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 SETUP_BYTES = 140
@@ -46,7 +46,7 @@ class TriangleSetupData(NamedTuple):
     ids: NDArray[np.int32]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> None:
     """Set up one primitive."""
     for k in range(3):
@@ -72,13 +72,13 @@ def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> Non
         box[2 + d] = max(screen[0, d], screen[1, d], screen[2, d])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _triangle_setup(part: int, parts: int, screen: Any, varyings: Any, edges: Any, planes: Any, boxes: Any) -> None:
     for p in range(part * len(screen) // parts, (part + 1) * len(screen) // parts):
         _setup(screen[p], varyings[p], edges[p], planes[p], boxes[p])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def evaluate(plane: Any, x: Any, y: Any) -> Any:
     """Value of a plane (device function)."""
     return plane[0] * x + plane[1] * y + plane[2]

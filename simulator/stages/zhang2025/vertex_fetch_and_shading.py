@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.simt import Simt
-from simulator.scenes.textured_mesh import Geometry
-from simulator.stages.ru2016.vertex_shading import eye_space
-from simulator.stages.thread_per_item import Access, thread_per_item
-from simulator.work import Work
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space
+from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 VERTEX_BYTES = 36  # position 16, normal 12, texture coordinate 8; in and out

@@ -1,0 +1,142 @@
+"""Kernels: functions that Numba compiles, kept on disk under a name that says all that they depend on.
+
+Numba's own disk cache looks only at the file of the kernel itself: it is stale when a helper in another file changes,
+and empty when a comment does. Here the name holds a digest of the kernel's bytecode and of all that it reaches: the
+kernels that it calls, in whatever module, and the constants and enums that it reads. So an edit recompiles the kernels
+whose code it changes, and no other; two checkouts share what they have in common.
+"""
+
+import contextlib
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, overload
+
+from numba import njit, types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+
+from tilestamp.models.compile_cache import cache_folder, note_compiling
+from tilestamp.models.kernel_digest import kernel_digest
+
+_UNREADABLE = (OSError, EOFError, AttributeError, ImportError, KeyError, pickle.UnpicklingError)
+
+
+class Kernel(Protocol):
+    """A compiled function: what it takes and returns is known when it is called, so that it is untyped to mypy."""
+
+    py_func: Callable[..., Any]
+
+    def __call__(self, *args: Any) -> Any:
+        """Call it, compiled for these types."""
+
+
+@overload
+def kernel(function: Callable[..., Any]) -> Kernel: ...
+@overload
+def kernel(*, error_model: str) -> Callable[[Callable[..., Any]], Kernel]: ...
+def kernel(
+    function: Callable[..., Any] | None = None, *, error_model: str = "python"
+) -> Kernel | Callable[[Callable[..., Any]], Kernel]:
+    """Compile a function where it is first called; it releases the GIL, and what was compiled is kept on disk.
+
+    ``@kernel``, or ``@kernel(error_model="numpy")`` where a division by zero gives inf or nan instead of an error.
+    """
+
+    def compiled(function: Callable[..., Any]) -> Kernel:
+        dispatcher: Any = njit(nogil=True, error_model=error_model)(function)
+        if hasattr(dispatcher, "py_func"):  # not where NUMBA_DISABLE_JIT is set
+            dispatcher._cache = _KernelCache(dispatcher)  # noqa: SLF001 - numba has no public way to name a cache
+        return dispatcher  # type: ignore[no-any-return]
+
+    return compiled if function is None else compiled(function)
+
+
+class _Locator(_CacheLocator):  # type: ignore[misc]  # numba has no types
+    """Where one kernel is kept: all in one folder, the digest in the file's name."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._py_file = function.__code__.co_filename  # numba asks for it when it cannot cache
+        self._digest = kernel_digest(function)
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(cache_folder())
+
+    def get_source_stamp(self) -> str:
+        """Nothing more than the file's name says."""
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        """Return what the file's name ends with."""
+        return self._digest
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], _py_file: str) -> "_Locator":
+        """Find the place of a kernel."""
+        return cls(py_func)
+
+
+class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
+    """As Numba writes compiled functions, elsewhere."""
+
+    _locator_classes = (_Locator,)
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """The cache of one kernel; it is looked for at the first call, when all that the kernel reaches is defined."""
+
+    _impl_class = _Impl
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher = dispatcher
+        self._found = False
+
+    def _find(self) -> None:
+        if not self._found:
+            super().__init__(self._dispatcher.py_func)
+            self._found = True
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        self._find()
+        return str(self._cache_path)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load what was compiled for the signature, None if it was not; a file that cannot be read is none."""
+        self._find()
+        index = self._cache_file._index_path  # noqa: SLF001
+        try:
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                os.utime(index)  # the mark by which pruning sees that it is in use
+        except _UNREADABLE:
+            found = None
+            with contextlib.suppress(OSError):
+                Path(index).unlink()
+        if found is None:
+            note_compiling(self._dispatcher.py_func)
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled; where nothing can be written it is not kept."""
+        self._find()
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+    def flush(self) -> None:
+        """Forget what was compiled."""
+        self._find()
+        super().flush()
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """As Numba's, with the options and with the names and order of the fields of what is passed in."""
+        options = sorted((name, str(value)) for name, value in self._dispatcher.targetoptions.items())
+        return (*super()._index_key(sig, codegen), str(options), _fields(sig))
+
+
+def _fields(sig: Any) -> str:
+    """Fields of the named tuples among some types: a kernel reads a field by its place."""
+    named = [(str(t), t.fields, _fields(t.types)) for t in sig if isinstance(t, types.BaseNamedTuple)]
+    return str(named) if named else ""
