@@ -10,7 +10,8 @@ import numpy as np
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import FIDELITIES, Fidelity
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_options, takes
+from tilestamp.simulator.options import plain
+from tilestamp.simulator.pipelines import can_take, load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
@@ -60,7 +61,7 @@ def simulate(
     picture : bool
         Whether one is wanted; without it what only makes the picture is skipped.
     **options
-        The pipeline's own: ``tile``, ``spp``, ``bound``, ``msaa``, ``mode``...
+        The pipeline's own: ``tilestamp list options PIPELINE``.
 
     Returns
     -------
@@ -73,16 +74,17 @@ def simulate(
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
     machine = load_machine(machine) if isinstance(machine, str) else machine
-    _check(pipeline, fidelity, width, height, options)
+    _check(fidelity, width, height)
+    chosen = pipeline_options(pipeline, options)
     if not 0.0 <= error < 1.0:
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, options)
-    draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, **options)
+    run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, plain(chosen))
+    draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, chosen)
     note = scene.note
-    without_picture = {"picture": False} if takes(pipeline, "picture") else {}
-    if error and takes(pipeline, "sample"):
+    without_picture = {"picture": False} if can_take(pipeline, "picture") else {}
+    if error and can_take(pipeline, "sample"):
         sampler = Sampler(error, seed, pipeline, machine)
         frame = draw(sample=sampler, **without_picture)
         if sampler.executed:
@@ -120,11 +122,8 @@ def _escalated(run: Run, sampler: Sampler) -> Run:
     return replace(run, frame=replace(run.frame, works=works), note=note, sampled=facts)
 
 
-def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:
+def _check(fidelity: str, width: int, height: int) -> None:
     """Refuse what no pipeline can draw."""
-    known = pipeline_options(pipeline)
-    for name in options.keys() - known.keys():
-        raise TilestampError(f"the pipeline {pipeline} has no option {name}; it has {', '.join(known)}")
     if fidelity not in FIDELITIES:
         raise TilestampError(f"fidelity is {', '.join(FIDELITIES)}, not {fidelity}")
     if width < 1 or height < 1:

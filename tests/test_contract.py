@@ -6,12 +6,12 @@ from numba import get_num_threads, set_num_threads
 
 from tilestamp import simulate
 from tilestamp.models.machine import load_machine
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_names, pipeline_options
+from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
 
 WIDTH, HEIGHT = 96, 72
-COUNTING = [name for name in pipeline_names() if "counting" in pipeline_options(name)]
+COUNTING = [name for name in pipeline_names() if "counting" in options_type(name).__struct_fields__]
 
 
 @pytest.fixture(scope="module", params=pipeline_names())

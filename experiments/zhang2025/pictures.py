@@ -12,7 +12,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.library import load_scene
 
@@ -44,7 +44,8 @@ def run(progress: Callable[[str], None]) -> Result:
     for name, (pipeline, machine, off, on) in PAIRS.items():
         progress(name)
         simt = load_machine(machine).simt
-        frames = [load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, **options) for options in (off, on)]
+        options = (pipeline_options(pipeline, given) for given in (off, on))
+        frames = [load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, chosen) for chosen in options]
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]

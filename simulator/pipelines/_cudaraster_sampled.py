@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from tilestamp.simulator.stages.laine2011.sampled_tiles import tile_areas
 from tilestamp.simulator.stages.laine2011.triangle_setup import BLOCK, MAX_SUBTRIANGLES, triangle_setup
 from tilestamp.simulator.work import Work
 
+if TYPE_CHECKING:
+    from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions
+
 
 def sampled_draw(
     sample: Sampler,
@@ -35,9 +38,7 @@ def sampled_draw(
     width: int,
     height: int,
     simt: Simt,
-    options: dict[str, Any],
-    *,
-    first_frame: bool,
+    options: "CudarasterOptions",
 ) -> Frame:
     """One draw: all triangles set up, binned and listed; counted in part of the blocks, and drawn in part of the tiles.
 
@@ -53,16 +54,14 @@ def sampled_draw(
     width, height : int
         Pixels.
     simt : Simt
-    options : dict
-        ``release``, ``samples``, ``mode``, ``cull_backfaces`` and ``guard_band``.
-    first_frame : bool
+    options : CudarasterOptions
     """
-    release, samples, mode = options["release"], options["samples"], options["mode"]
+    release, samples, mode = options.release, options.msaa, options.mode
     depth, _, _, interpolate = MODES[mode]
     shape: dict[str, Any] = {"width": width, "height": height, "simt": simt, "release": release}
     prepare: Callable[..., Any] = partial(
-        triangle_setup, positions, **shape, samples=samples, cull_backfaces=options["cull_backfaces"],
-        guard_band=options["guard_band"],
+        triangle_setup, positions, **shape, samples=samples, cull_backfaces=options.cull_backfaces,
+        guard_band=options.guard_band,
         depth=depth, interpolate=interpolate, capacity=MAX_SUBTRIANGLES,
     )  # fmt: skip
     setup, all_of_it, facts = prepare(triangles, counting=False)
@@ -88,7 +87,7 @@ def sampled_draw(
     needed = facts["numSubtris"], bin_facts["num_bin_segments"], tile_facts["num_tile_segments"]
     room = first_room(len(triangles), width, height).values()
     failed = [works[:last] for last, (most, first) in enumerate(zip(needed, room, strict=True), 1) if most > first]
-    return Frame.numbers([*chain(*failed), *works] if first_frame else works, {"retries": len(failed)})
+    return Frame.numbers([*chain(*failed), *works] if options.first_frame else works, {"retries": len(failed)})
 
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:

@@ -5,14 +5,17 @@ raster draws each 8x8 tile in shared memory.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._cudaraster_facts import (
     Counters,
     add_counters,
@@ -30,23 +33,60 @@ from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
 from tilestamp.simulator.stages.laine2011.coverage import TILE
 from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
-from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
+from tilestamp.simulator.stages.laine2011.triangle_setup import (
+    MAX_SUBTRIANGLES,
+    SLACK,
+    Release,
+    as_published,
+    triangle_setup,
+)
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 from tilestamp.simulator.work import Work
 
-MAX_BATCHES = 1024
+
+class CudarasterOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline cudaraster."""
+
+    release: Release = "1.1"
+    """CudaRaster 1.1, or the copy in nvdiffrast."""
+    msaa: Literal[1, 2, 4, 8] = 1
+    """Samples a pixel (nvdiffrast: 1)."""
+    mode: Mode = "depth"
+    """Depth test and interpolation; no depth, interpolation, blending; depth without colour; neither depth nor
+    interpolation (the published sweep). nvdiffrast has depth alone."""
+    cull_backfaces: bool | None = None
+    """Drop triangles that face away; none: as published, on in 1.1, off in nvdiffrast."""
+    guard_band: bool | None = None
+    """Leave triangles whole that leave the screen by less than 2048 pixels; none: on in 1.1, off in nvdiffrast, whose
+    copies differ: some have it on."""
+    batches: Annotated[int, Meta(ge=1, le=1024)] = 1
+    """Draws that the triangles are divided among; the first clears."""
+    copy_parameters: bool = False
+    """As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory."""
+    first_frame: bool = False
+    """Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
+    they have grown in a frame before, as where frames are timed."""
+    counting: bool = True
+    """Count what the machine does; without it there is a picture and no time."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("cull_backfaces", "guard_band"):
+            msgspec.structs.force_setattr(self, name, as_published(getattr(self, name), self.release))
+        if self.release == "nvdiffrast" and (self.mode != "depth" or self.msaa != 1):
+            raise TilestampError(f"release nvdiffrast has mode depth and msaa 1, not {self.mode} and {self.msaa}")
+        if self.copy_parameters and self.release != "nvdiffrast":
+            raise TilestampError(f"copy_parameters: release {self.release} does not copy them; nvdiffrast does")
 
 
 @dataclass
 class _State:
     """What draws of one frame hand on: capacities, pixels and sums."""
 
-    options: dict[str, Any]
+    options: CudarasterOptions
     size: tuple[int, int]
     simt: Simt
-    counting: bool
     colors: NDArray[np.float32] | None
-    first_frame: bool
     capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
@@ -62,16 +102,8 @@ def cudaraster(
     width: int,
     height: int,
     simt: Simt,
+    options: CudarasterOptions,
     *,
-    release: Release = "1.1",
-    msaa: int = 1,
-    mode: Mode = "depth",
-    cull_backfaces: bool | None = None,
-    guard_band: bool | None = None,
-    batches: int = 1,
-    copy_parameters: bool = False,
-    first_frame: bool = False,
-    counting: bool = True,
     sample: Sampler | None = None,
     picture: bool = True,
 ) -> Frame:
@@ -87,25 +119,7 @@ def cudaraster(
         Pixels, at most 2048.
     simt : Simt
         The machine's shape.
-    release : {"1.1", "nvdiffrast"}
-    msaa : int
-        1, 2, 4 or 8 samples a pixel (nvdiffrast: 1).
-    mode : {"depth", "blend", "depth-only", "color"}
-        Depth test and interpolation; no depth, interpolation, blending; depth without colour; neither depth nor
-        interpolation (the published sweep).
-    cull_backfaces : bool or None
-        None: as published, on in 1.1, off in nvdiffrast.
-    guard_band : bool or None
-        Leave triangles whole that leave the screen by less than 2048 pixels; None: on in 1.1, off in nvdiffrast, whose
-        copies differ: some have it on.
-    batches : int
-        Draws that the triangles are divided among; the first clears.
-    copy_parameters : bool
-        As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory.
-    first_frame : bool
-        Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
-        they have grown in a frame before, as where frames are timed; ``facts["retries"]`` says how often.
-    counting : bool
+    options : CudarasterOptions
     sample : Sampler, optional
         Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
     picture : bool
@@ -115,35 +129,30 @@ def cudaraster(
     -------
     Frame
         Depth is the original's fixed point, uint32. With several samples, depth and triangle ids are those of the
-        sample nearest to the pixel's centre.
+        sample nearest to the pixel's centre. ``facts["retries"]``: draws that a first frame repeats.
 
     Raises
     ------
     TilestampError
-        Where the scene or an option cannot be drawn.
+        Where the scene or the size cannot be drawn.
     """
-    _check(release, mode, batches)
-    if copy_parameters and release != "nvdiffrast":
-        raise TilestampError(f"copy_parameters: release {release} does not copy them; nvdiffrast does")
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    options: dict[str, Any] = {"release": release, "samples": msaa, "mode": mode}
-    options |= {"cull_backfaces": cull_backfaces, "guard_band": guard_band}
-    if sample is not None and batches == 1 and sample.pays(len(mesh.triangles)):
-        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options, first_frame=first_frame)
-    colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
-    state = _State(options, (width, height), simt, counting, colors, first_frame)
-    for first, last in _batch_bounds(len(mesh.triangles), batches):
+    if sample is not None and options.batches == 1 and sample.pays(len(mesh.triangles)):
+        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options)
+    colors = None if options.mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
+    state = _State(options, (width, height), simt, colors)
+    for first, last in _batch_bounds(len(mesh.triangles), options.batches):
         _draw(state, positions, mesh.triangles[first:last], first)
-    if copy_parameters:
+    if options.copy_parameters:
         state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
+    facts = frame_facts(state.counters, state.needed, options.release, state.retries)
     if not picture:
-        return Frame.numbers(state.works, frame_facts(state.counters, state.needed, release, state.retries))
+        return Frame.numbers(state.works, facts)
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
-    shown = shown_sample(msaa)
+    shown = shown_sample(options.msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
-    image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
-    facts = frame_facts(state.counters, state.needed, release, state.retries)
+    image = frame_image(state.buffers, width, height, options.release, positions, mesh.triangles, colors)
     return Frame(
         image,
         state.buffers.depth[shown, :height, :width][::-1],
@@ -162,16 +171,18 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     A stage that overflows is executed to its end all the same; the kernels behind it return at once.
     """
     width, height = state.size
-    release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
+    options = state.options
+    release, samples, mode, counting = options.release, options.msaa, options.mode, options.counting
     depth, _, _, interpolate = MODES[mode]
-    shape = {"width": width, "height": height, "simt": state.simt, "release": release, "counting": state.counting}
+    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": release}
+    shape["counting"] = counting
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
     while True:
         setup, setup_work, facts = triangle_setup(
-            positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
-            guard_band=state.options["guard_band"], depth=depth, interpolate=interpolate,
-            capacity=state.capacity["numSubtris"] if state.first_frame else MAX_SUBTRIANGLES,
+            positions, triangles, **shape, samples=samples, cull_backfaces=options.cull_backfaces,
+            guard_band=options.guard_band, depth=depth, interpolate=interpolate,
+            capacity=state.capacity["numSubtris"] if options.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
         setup_work = replace(setup_work, variant=mode)
         state.works.append(setup_work)
@@ -192,12 +203,12 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     )  # fmt: skip
     variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
     state.works.append(replace(fine_work, variant=variant))
-    if state.counting:
+    if counting:
         drawn = int(np.count_nonzero(setup.subtriangles))
         counters = setup_counters(setup_work, fine_work, drawn, len(triangles)) | bin_facts["counters"]
         counters |= tile_facts["counters"] | fine_counters(fine_work, depth=depth, msaa=samples)
         state.counters = add_counters(state.counters, counters)
-    tile_maps(state.maps, lists, fine_work if state.counting else None)
+    tile_maps(state.maps, lists, fine_work if counting else None)
 
 
 def _initial_capacity(state: _State, triangles: int) -> None:
@@ -213,18 +224,9 @@ def _grow(state: _State, name: str, needed: int, slack: int) -> bool:
         return False
     state.capacity[name] = needed + slack
     state.retries += 1
-    return state.first_frame
+    return state.options.first_frame
 
 
 def _batch_bounds(triangles: int, batches: int) -> list[tuple[int, int]]:
     """First and last triangle of each draw."""
     return [(triangles * i // batches, triangles * (i + 1) // batches) for i in range(batches)]
-
-
-def _check(release: str, mode: str, batches: int) -> None:
-    if mode not in MODES:
-        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
-    if release == "nvdiffrast" and mode != "depth":
-        raise TilestampError(f"mode is {mode!r}; release nvdiffrast has only 'depth'")
-    if not 1 <= batches <= MAX_BATCHES:
-        raise TilestampError(f"{batches} batches: 1 to {MAX_BATCHES} can be drawn")

@@ -5,28 +5,65 @@ screen tiles by count, scan and write; rasterize each tile. In the hybrid the gr
 instead of the buckets.
 """
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
 from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
 from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010 import snap_edges as snapping
-from tilestamp.simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
+from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
+    MAX_DEPTH,
+    BoundRule,
+    SubPatches,
+    bound_and_split,
+)
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
-from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, screen_tiles
-from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, tile_raster
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 from tilestamp.simulator.work import Work
+
+
+class MicropolygonOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline micropolygon."""
+
+    tile: TileSize = 8
+    """Pixels on a side of a screen tile."""
+    spp: Literal[1, 4, 16] = 1
+    """Samples a pixel."""
+    bound: Annotated[float, Meta(gt=0)] = 4.0
+    """Pixels that a sub-patch may be wide and high on screen."""
+    bound_rule: BoundRule = "control_points"
+    """How that is measured: on control points, or as whole pixels, the reading that matches the paper's counts."""
+    box_tests: bool = True
+    """Test boxes before edge functions."""
+    edges: Edges = "computed"
+    """Edge equations computed by each thread, or computed while dicing and loaded."""
+    near: Annotated[float, Meta(ge=0)] = 0.0
+    """Sub-patches wholly nearer to the eye's plane are culled, so that splitting across it ends (not in the paper)."""
+    min_depth: Annotated[int, Meta(ge=0, le=MAX_DEPTH)] = 0
+    """Halvings that every sub-patch takes; as many as the deepest needs leave no cracks."""
+    snap_edges: bool = False
+    """Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks (not
+    in the paper). Its look-ups are counted and not priced. A sampled run then samples bound and split alone."""
+    hybrid: bool = False
+    """Give the diced grids to the fixed-function rasterizer."""
+    texture: NDArray[np.uint8] | None = None
+    """Laid over each patch: (H, W, 3 or 4) bytes."""
+    counting: bool = True
+    """Count what the machine does; without it there is a picture and no time."""
 
 
 def micropolygon(
@@ -35,19 +72,8 @@ def micropolygon(
     width: int,
     height: int,
     simt: Simt,
+    options: MicropolygonOptions,
     *,
-    tile: int = 8,
-    spp: int = 1,
-    bound: float = 4,
-    bound_rule: BoundRule = "control_points",
-    box_tests: bool = True,
-    edges: Literal["computed", "loaded"] = "computed",
-    near: float = 0.0,
-    min_depth: int = 0,
-    snap_edges: bool = False,
-    hybrid: bool = False,
-    texture: NDArray[np.uint8] | None = None,
-    counting: bool = True,
     sample: Sampler | None = None,
     picture: bool = True,
 ) -> Frame:
@@ -62,32 +88,7 @@ def micropolygon(
     width, height : int
         Pixels.
     simt : Simt
-    tile : int
-        Pixels a side of a screen tile: 4, 8, 16 or 32.
-    spp : int
-        Samples a pixel: 1, 4 or 16.
-    bound : float
-        Pixels that a sub-patch may be wide and high on screen.
-    bound_rule : {"control_points", "pixel_extent"}
-        How that is measured; see ``bound_and_split``.
-    box_tests : bool
-        Test boxes before edge functions.
-    edges : {"computed", "loaded"}
-        Edge equations computed by each thread, or computed while dicing and loaded.
-    near : float
-        Sub-patches wholly nearer to the eye's plane than this are culled, so that splitting across it ends (not in the
-        paper).
-    min_depth : int
-        Halvings that every sub-patch takes; as many as the deepest needs leave no cracks.
-    snap_edges : bool
-        Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks
-        (not in the paper). Its look-ups are counted and not priced. A sampled run then samples bound and split alone.
-    hybrid : bool
-        Give the diced grids to the fixed-function rasterizer.
-    texture : ndarray, (H, W, 3 or 4), uint8, optional
-        Laid over each patch.
-    counting : bool
-        Count what the machine does.
+    options : MicropolygonOptions
     sample : Sampler, optional
         Run part of the units; no picture comes back.
     picture : bool
@@ -101,57 +102,46 @@ def micropolygon(
     Raises
     ------
     TilestampError
-        A scene without patches, or options that a stage does not have.
+        A scene without patches.
     """
     if scene.patches is None:
         raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
-    if texture is not None and not isinstance(texture, np.ndarray):
-        raise TilestampError(f"texture must be an array of (H, W, 3 or 4) bytes, not {texture!r}")
-    points = scene.patches.points
-    tiles = screen_tiles(width, height, tile, bound)
-    boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid and not snap_edges else None
+    points, texture, counting = scene.patches.points, options.texture, options.counting
+    tiles = screen_tiles(width, height, options.tile, options.bound)
+    boxes: list[NDArray[np.float32]] | None = [] if sample and not options.hybrid and not options.snap_edges else None
     subpatches, split = bound_and_split(
-        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, near=near,
-        min_depth=min_depth, wanted=boxes, sample=sample,
+        points, matrix, width, height, options.bound, simt, bound_rule=options.bound_rule, counting=counting,
+        near=options.near, min_depth=options.min_depth, wanted=boxes, sample=sample,
     )  # fmt: skip
+    raster: dict[str, Any] = {"spp": options.spp, "box_tests": options.box_tests, "edges": options.edges}
     if sample and boxes and sample.pays(len(subpatches.patch)):
-        options = {"spp": spp, "box_tests": box_tests, "edges": edges}
         view = matrix, width, height, simt
         rest = sampled_back_end(
-            sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=options
+            sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=raster
         )
         return Frame.numbers([*split, *rest], _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS)))
     grids, diced = dice(
         points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
     )
-    if snap_edges:
+    if options.snap_edges:
         snapped = snapping.snap_edges(subpatches, grids, snapping.shared_edges(points))
         grids = snapped.grids
         if counting:
             diced += snapping.snap_works(snapped, len(points), simt, textured=texture is not None)
-    if hybrid:
+    if options.hybrid:
         return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
     start, scanned = bucket_scan(count, simt, counting=counting)
     lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
     image, depth, overdraw, drawn = tile_raster(
-        grids.vertices,
-        count,
-        start,
-        lists,
-        tiles,
-        width,
-        height,
-        simt,
-        spp=spp,
-        box_tests=box_tests,
-        edges=edges,
-        counting=counting,
+        grids.vertices, count, start, lists, tiles, width, height, simt, **raster, counting=counting
     )
     works = [*split, *diced, *counted, *scanned, *written, *drawn]
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
     facts = _facts(subpatches, len(lists))
-    return Frame(image, depth, works, maps=maps, facts=facts, tile=tile) if picture else Frame.numbers(works, facts)
+    if not picture:
+        return Frame.numbers(works, facts)
+    return Frame(image, depth, works, maps=maps, facts=facts, tile=options.tile)
 
 
 def _maps(

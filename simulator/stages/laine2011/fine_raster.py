@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Coalescing, Simt
@@ -235,13 +234,7 @@ def fine_raster(
     work : Work
         A row an active tile.
 
-    Raises
-    ------
-    TilestampError
-        For an unknown mode.
     """
-    if mode not in MODES:
-        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
     depth, blend, write_color, interpolate = MODES[mode]
     draw = Draw(
         log_samples=samples.bit_length() - 1,
