@@ -91,14 +91,18 @@ def list_machines() -> dict[str, str]:
     return {file.stem: tomllib.loads(file.read_text("utf-8"))["identity"]["description"] for file in files}
 
 
-def load_machine(name_or_path: str | Path) -> Machine:
-    """Read a machine by its name, or from a file of the user's.
+def load_machine(name_or_path: str | Path | Machine) -> Machine:
+    """Read a machine by its name, or from a file of the user's; a Machine is given back.
 
     Raises
     ------
     TilestampError
         No such machine or file; a key that is unknown, missing or out of range; numbers that contradict each other.
     """
+    if isinstance(name_or_path, Machine):
+        return name_or_path
+    if not isinstance(name_or_path, str | Path):
+        raise TilestampError(f"a machine is a Machine, a name or a machine file, not {name_or_path!r}")
     path = Path(name_or_path)
     if path.suffix != ".toml":
         path = FOLDER / f"{name_or_path}.toml"

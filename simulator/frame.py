@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
+NOTHING = "nothing is visible: all of it is off screen, nearer or farther than the camera sees, culled or without area"
 REMARKS = {  # a fact that counts what was lost, repeated or left to chance: the sentence about it
     "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn",
     "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
@@ -31,7 +32,7 @@ class Frame:
     image : ndarray, (H, W, 3), uint8
         Row 0 is the top row. Without pixels where only numbers were asked for: ``numbers``.
     depth : ndarray, (H, W)
-        In the pipeline's own format (float32, or the original's uint32).
+        In the pipeline's own format: float32, 1 where nothing was drawn, or the original's uint32.
     works : sequence of Work or FixedFunctionWork
         One for each kernel launch.
     triangle_ids : ndarray, (H, W), int32, or None
@@ -61,9 +62,22 @@ class Frame:
     @property
     def remarks(self) -> tuple[str, ...]:
         """The warnings, and a sentence for each fact that says of something lost, repeated or left to chance."""
-        return self.warnings + tuple(
-            sentence.format(self.facts[fact]) for fact, sentence in REMARKS.items() if self.facts.get(fact)
+        nothing = (NOTHING,) if self.shows_nothing else ()
+        return (
+            nothing
+            + self.warnings
+            + tuple(sentence.format(self.facts[fact]) for fact, sentence in REMARKS.items() if self.facts.get(fact))
         )
+
+    @property
+    def shows_nothing(self) -> bool:
+        """Whether no pixel shows anything of the scene; without a picture, whether no sample was hit."""
+        if self.triangle_ids is not None:
+            return not (self.triangle_ids >= 0).any()
+        if self.depth.size and self.depth.dtype == np.float32:
+            return not (self.depth != 1).any()
+        hits = [work.counts()["SAMPLE_HITS"] for work in self.works if "SAMPLE_HITS" in work.counts()]
+        return bool(hits) and not any(hits)
 
     @classmethod
     def numbers(cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any] | None = None) -> "Frame":

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,7 +165,6 @@ class Run:
         """The frame's time and its 95 % interval."""
         return self.intervals["frame", "milliseconds"]
 
-    def on(self, machine: Machine | str, fidelity: Fidelity | None = None) -> "Run":
+    def on(self, machine: Machine | str | Path, fidelity: Fidelity | None = None) -> "Run":
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
-        machine = load_machine(machine) if isinstance(machine, str) else machine
-        return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
+        return replace(self, machine=load_machine(machine), fidelity=fidelity or self.fidelity)

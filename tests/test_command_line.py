@@ -61,7 +61,7 @@ def test_list_says_what_each_thing_is(kind, capsys):
         (["render", "teapot", "--machine", "gtx9999"], "gtx9999"),
         (["render", "teapot", "--pipeline", "raytracer"], "raytracer"),
         (["render", "teapot", "--size", "big"], "--size"),
-        (["render", "teapot", "--size", "0x10"], "0x10"),
+        (["render", "teapot", "--size", "0x10"], "width"),
         (["render", "teapot", "--size", "900000x900000"], "memory"),
         (["render", "teapot", *SMALL, "--tile", "5"], "5"),
         (["render", "teapot", *SMALL, "--spp", "3"], "3"),

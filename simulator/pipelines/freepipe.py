@@ -11,10 +11,12 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing
+from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing, freepipe_work
 from tilestamp.simulator.stages.liu2010.freepipe import freepipe as draw
+from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.simulator.work import Work
 
 
 class FreepipeOptions(Options, frozen=True, kw_only=True):
@@ -29,6 +31,10 @@ class FreepipeOptions(Options, frozen=True, kw_only=True):
     """Threads in a block."""
     counting: bool = True
     """Count what the machine does; without it there is a picture and no time."""
+
+    def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
+        """One kernel, of ``block`` threads."""
+        return [freepipe_work(np.zeros((0, len(FreePipeEvent)), np.int64), self.block, self.early)]
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -31,8 +31,8 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
-from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, tile_raster
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
 
 
@@ -64,6 +64,11 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Laid over each patch: (H, W, 3 or 4) bytes."""
     counting: bool = True
     """Count what the machine does; without it there is a picture and no time."""
+
+    def launches(self, simt: Simt) -> list[Work]:
+        """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
+        shape = block_shape(self.tile, self.spp, simt, box_tests=self.box_tests, loaded=self.edges == "loaded")
+        return [] if self.hybrid else [raster_work(shape, np.zeros((0, len(TileRasterEvent)), np.int64))]
 
 
 def micropolygon(

@@ -16,7 +16,7 @@ from tilestamp.simulator.stages.ru2016.ambient_occlusion import ambient_occlusio
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
-from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
+from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, raster_work, tiled_raster
 from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
 from tilestamp.simulator.work import Work
 
@@ -36,6 +36,10 @@ class TiledOptions(Options, frozen=True, kw_only=True):
     """How textures are filtered."""
     ssao: bool = False
     """Screen-space ambient occlusion."""
+
+    def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
+        """Tiled raster has a thread a pixel of a tile."""
+        return [raster_work(np.zeros((0, len(TiledRasterEvent)), np.int64), self.tile)]
 
 
 def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: TiledOptions) -> Frame:

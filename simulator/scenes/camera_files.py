@@ -46,11 +46,9 @@ def read_camera(source: Any = None, scene: Scene | Mapping[str, Camera] | None =
         return _from_mapping(source)
     if isinstance(source, (list, tuple, np.ndarray)):
         return ModelToClip(source)
-    if isinstance(source, Camera):
+    if isinstance(source, Camera) and callable(source.matrix) and not isinstance(source, type):
         return source
-    raise TilestampError(
-        f"camera: a {type(source).__name__} is not a camera, a 4x4 matrix, a dictionary or a file name"
-    )
+    raise TilestampError(f"camera: {source!r} is not a camera, a 4x4 matrix, a dictionary or a file name")
 
 
 def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:

@@ -73,6 +73,8 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
     """
     if isinstance(source, Scene):
         return source
+    if not isinstance(source, str | Path):
+        raise TilestampError(f"a scene is a Scene, a name or a file, not {source!r}")
     path = _resolve(source, scene_path)
     name = str(source) if source in EMBEDDED else path.stem
     return with_views(_read(name, path, kind))
@@ -135,6 +137,8 @@ def bounds(scene: Scene) -> NDArray[np.float64]:
         used = np.zeros(len(scene.mesh.positions), dtype=np.bool_)
         used[scene.mesh.triangles] = True
         homogeneous.append(scene.mesh.positions[used])
+    if not sum(map(len, homogeneous)):
+        raise TilestampError(f"the scene {scene.name} has neither patches nor triangles")
     points = np.concatenate(homogeneous).astype(np.float64)
     points = points[:, :3] / points[:, 3:]
     return np.stack([points.min(axis=0), points.max(axis=0)])

@@ -183,7 +183,7 @@ def tile_raster(
         return image, depth, overdraw, []
     seen = np.zeros(len(vertices), np.bool_)
     seen[lists] = True
-    works = [_work(shape, table, raster_streams(table, len(lists), int(np.count_nonzero(seen)), shape, simt))]
+    works = [raster_work(shape, table, raster_streams(table, len(lists), int(np.count_nonzero(seen)), shape, simt))]
     return image, depth, overdraw, works
 
 
@@ -213,8 +213,8 @@ def raster_streams(
     return tuple(streams)
 
 
-def _work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...]) -> Work:
-    """Work of the kernel."""
+def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
+    """Work of the kernel, a row a tile."""
     return Work(
         "tile_raster",
         "tile_raster",

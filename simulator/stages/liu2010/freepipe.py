@@ -244,5 +244,16 @@ def _make_work(
         Stream("positions", "load", 3 * 16 * len(triangles), positions.nbytes),
         Stream("frame", "atomic", served, CHUNK_BYTES * int(np.count_nonzero(requests))),
     )
+    return freepipe_work(table, block, early, streams, requests)
+
+
+def freepipe_work(
+    table: NDArray[np.int64],
+    block: int,
+    early: bool,
+    streams: tuple[Stream, ...] = (),
+    requests: NDArray[np.int64] | None = None,
+) -> Work:
+    """Work of the kernel, a row a block."""
     kernel = "freepipe_early" if early else "freepipe"
-    return Work("freepipe", kernel, E, table, blocks, block, 0, "blocks", streams, requests)
+    return Work("freepipe", kernel, FreePipeEvent, table, len(table), block, 0, "blocks", streams, requests)

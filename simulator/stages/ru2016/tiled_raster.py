@@ -191,8 +191,12 @@ def tiled_raster(
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
         ),
     )
-    work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
-    return visible, work
+    return visible, raster_work(events, tile, streams)
+
+
+def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...] = ()) -> Work:
+    """Work of the kernel, a row and a block a tile, a thread a pixel."""
+    return Work("tiled_raster", "tiled_raster", TiledRasterEvent, table, len(table), tile * tile, streams=streams)
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
