@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.counters import Counter
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fixed_function import PipeLaunch
 from tilestamp.models.launch import Launch
@@ -18,7 +19,7 @@ from tilestamp.simulator import intervals
 from tilestamp.simulator.estimate import Estimate
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.mix import load_mix
-from tilestamp.simulator.stage_table import interval_table, stage_table
+from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
@@ -109,6 +110,11 @@ class Run:
         return counts
 
     @property
+    def counters(self) -> dict[str, Counter]:
+        """What its stages declare for reports, by name: titles and kinds of columns of ``stages``."""
+        return declared(self.frame.works)
+
+    @property
     def milliseconds(self) -> float:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
@@ -117,8 +123,8 @@ class Run:
     def intervals(self) -> dict[tuple[str, str], Estimate]:
         """Value, low and high of 95 % intervals by stage (``frame``: all) and number.
 
-        Numbers are ``milliseconds``, ``instructions``, ``sample_tests`` and ``sample_hits``; what was not sampled has
-        an interval of no width.
+        Numbers are ``milliseconds``, ``instructions`` and the counts that stages declare (``sample_tests``,
+        ``sample_hits``); what was not sampled has an interval of no width.
         """
         parts: dict[tuple[str, str], list[Estimate]] = {}
         for work, found in zip(self.frame.works, self.launch_intervals, strict=True):
@@ -136,7 +142,8 @@ class Run:
     def _intervals(self, work: Any, launch: Any, timing: Timing) -> dict[str, Estimate]:
         """Of one launch."""
         counts = intervals.count_intervals(work)
-        known = {name.lower(): counts.get(name, intervals.exactly(0)) for name in ("SAMPLE_TESTS", "SAMPLE_HITS")}
+        known = {name: intervals.exactly(0) for name, counter in self.counters.items() if counter.kind == "count"}
+        known |= {counter.name: counts[counter.events[0]] for counter in work.counters if counter.kind == "count"}
         if isinstance(work, Work):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)

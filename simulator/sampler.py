@@ -20,7 +20,6 @@ from tilestamp.simulator.strata import Sample, drawn, make_strata, pilot
 from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
-MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
 SMALLEST = (
     60_000  # primitives of a frame; below, drawing a sample and pricing it costs more than running all (measured)
 )
@@ -131,12 +130,12 @@ class Sampler:
         return bool((found.half_width <= self.error * np.abs(found.value)).all())
 
     def measures(self, work: Work, rows: Integers) -> Floats:
-        """What the answer is made of, of each unit: instructions, cycles, main counts; (units, quantities)."""
+        """What the answer is made of, of each unit: instructions, cycles, counts declared; (units, quantities)."""
         launch = load_mix(self.pipeline, self.machine.compute_capability).launch(
             replace(work, table=rows, streams=()), self.machine.sm.warp_size
         )
         asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
-        counts = [rows[:, work.events[name]] for name in MAIN_COUNTS if name in work.events.__members__]
+        counts = [rows[:, work.events[counter.events[0]]] for counter in work.counters if counter.kind == "count"]
         instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
         return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)
 

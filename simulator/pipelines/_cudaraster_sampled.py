@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines._cudaraster_facts import first_room
+from tilestamp.simulator.frame import Frame, remarks
+from tilestamp.simulator.pipelines._cudaraster_facts import REMARKS, first_room
 from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
@@ -87,7 +87,8 @@ def sampled_draw(
     needed = facts["numSubtris"], bin_facts["num_bin_segments"], tile_facts["num_tile_segments"]
     room = first_room(len(triangles), width, height).values()
     failed = [works[:last] for last, (most, first) in enumerate(zip(needed, room, strict=True), 1) if most > first]
-    return Frame.numbers([*chain(*failed), *works] if options.first_frame else works, {"retries": len(failed)})
+    found = {"retries": len(failed)}
+    return Frame.numbers([*chain(*failed), *works] if options.first_frame else works, found, remarks(REMARKS, found))
 
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import TILE, texture_chains
@@ -24,6 +24,12 @@ from tilestamp.simulator.stages.zhang2025.rop_block import RopEvent
 from tilestamp.simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
 from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
+
+REMARKS = {
+    "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
+    "fragments lost beyond the kept ones": "{:,} fragments beyond those that a pixel can keep are lost",
+    "fragments beyond the stream's room": "{:,} fragments find no room in the original's stream",
+}
 
 
 class BinnedOptions(Options, frozen=True, kw_only=True):
@@ -83,19 +89,21 @@ def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Si
     )  # fmt: skip
     image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
 
+    facts = {
+        "primitives after culling": len(data.ids),
+        "quads": len(stream.entries),
+        "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
+        "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
+        "holes": resolve.total(RopEvent.HOLES),
+    }
     return Frame(
         image,
         depth[::-1],
         [shading, assembly, compaction, setup, binning, coarse, fine, shader, resolve, streaming],
         triangle_ids=np.where(winners >= 0, mesh.ids[winners], -1).astype(np.int32)[::-1],
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
-        facts={
-            "primitives after culling": len(data.ids),
-            "quads": len(stream.entries),
-            "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
-            "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
-            "holes": resolve.total(RopEvent.HOLES),
-        },
+        facts=facts,
+        warnings=remarks(REMARKS, facts),
         tile=SCREEN_TILE,
         tiles_from_below=True,
     )

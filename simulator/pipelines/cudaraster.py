@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._cudaraster_facts import (
+    REMARKS,
     Counters,
     add_counters,
     fine_counters,
@@ -148,7 +149,7 @@ def cudaraster(
         state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
     facts = frame_facts(state.counters, state.needed, options.release, state.retries)
     if not picture:
-        return Frame.numbers(state.works, facts)
+        return Frame.numbers(state.works, facts, remarks(REMARKS, facts))
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(options.msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
@@ -160,6 +161,7 @@ def cudaraster(
         ids,
         maps=state.maps,
         facts=facts,
+        warnings=remarks(REMARKS, facts),
         tile=TILE,
         tiles_from_below=True,
     )

@@ -5,6 +5,7 @@ screen tiles by count, scan and write; rasterize each tile. In the hybrid the gr
 instead of the buckets.
 """
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
 from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
@@ -34,6 +35,10 @@ from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
+
+REMARKS = {
+    "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn"
+}
 
 
 class MicropolygonOptions(Options, frozen=True, kw_only=True):
@@ -124,7 +129,8 @@ def micropolygon(
         rest = sampled_back_end(
             sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=raster
         )
-        return Frame.numbers([*split, *rest], _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS)))
+        facts = _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS))
+        return Frame.numbers([*split, *rest], facts, remarks(REMARKS, facts))
     grids, diced = dice(
         points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
     )
@@ -134,7 +140,8 @@ def micropolygon(
         if counting:
             diced += snapping.snap_works(snapped, len(points), simt, textured=texture is not None)
     if options.hybrid:
-        return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
+        drawn_grids = draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
+        return replace(drawn_grids, warnings=remarks(REMARKS, drawn_grids.facts))
     count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
     start, scanned = bucket_scan(count, simt, counting=counting)
     lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
@@ -145,8 +152,9 @@ def micropolygon(
     maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
     facts = _facts(subpatches, len(lists))
     if not picture:
-        return Frame.numbers(works, facts)
-    return Frame(image, depth, works, maps=maps, facts=facts, tile=options.tile)
+        return Frame.numbers(works, facts, remarks(REMARKS, facts))
+    warnings = remarks(REMARKS, facts)
+    return Frame(image, depth, works, maps=maps, facts=facts, warnings=warnings, tile=options.tile)
 
 
 def _maps(

@@ -18,6 +18,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import Pieces, _start_edges, make_pieces
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import FixedFunctionWork
 
 SUBPIXEL_BITS = 8
@@ -195,4 +196,4 @@ def _work(
         Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
     )
     events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
-    return FixedFunctionWork("hardware", "draw", items, events, streams), rasterized
+    return FixedFunctionWork("hardware", "draw", items, events, streams, SAMPLE_COUNTERS), rasterized

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import transactions
+from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
@@ -37,6 +39,7 @@ _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
 
 
+@shown(*SAMPLE_COUNTERS)
 class TiledRasterEvent(IntEnum):
     """Events of one block, that is of one tile."""
 
