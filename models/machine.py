@@ -115,7 +115,7 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
         table = tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
         raise TilestampError(f"cannot read the machine file {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # no TOML, no text or no path
         raise TilestampError(f"{path} is not a TOML file: {error}") from error
     return _build(table, str(path))
 

@@ -46,7 +46,7 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """Texels on a side of a storage tile."""
     cull_backfaces: bool = True
     """Cull triangles that face away."""
-    fragments_a_pixel: Annotated[int, Meta(ge=0)] = KEPT
+    fragments_a_pixel: Annotated[int, Meta(ge=0, le=65536)] = KEPT
     """How many a pixel can keep; 0 for all."""
     fragment_depth: FragmentDepth = "direct"
     """How the depth that goes to the last test is evaluated: as early z does; or stepped within a quad, as the original

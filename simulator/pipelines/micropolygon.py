@@ -48,7 +48,7 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Pixels on a side of a screen tile."""
     spp: Literal[1, 4, 16] = 1
     """Samples a pixel."""
-    bound: Annotated[float, Meta(gt=0)] = 4.0
+    bound: Annotated[float, Meta(gt=0, le=4096)] = 4.0
     """Pixels that a sub-patch may be wide and high on screen."""
     bound_rule: BoundRule = "control_points"
     """How that is measured: on control points, or as whole pixels, the reading that matches the paper's counts."""

@@ -72,10 +72,10 @@ def _load_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TilestampError(f"{path}: the camera file cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise TilestampError(f"{path}: the camera file is not text") from None
     except json.JSONDecodeError as error:
         raise TilestampError(f"{path}:{error.lineno}: not JSON ({error.msg})") from None
+    except ValueError:
+        raise TilestampError(f"{path}: the camera file is not text") from None
 
 
 def _member(document: Any, key: str) -> Any:
