@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import SECTOR_BYTES, SEGMENT_BYTES
+from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing, Simt
@@ -184,4 +184,4 @@ def transaction_bytes(simt: Simt, stage: str) -> int:
     """
     if simt.warp != WARP or simt.coalescing == Coalescing.HALF_WARP_SEGMENTS:
         raise TilestampError(f"{stage}: cudaraster votes over warps of 32 and needs compute capability 2.0 or later")
-    return SECTOR_BYTES if simt.coalescing == Coalescing.WARP_SECTORS else SEGMENT_BYTES
+    return int(smallest_transaction_bytes(int(simt.coalescing)))
