@@ -238,7 +238,7 @@ def init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
         size = int(sizes[rows.start or 0])
         stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
-        table[rows, BucketInitEvent.STORE_TRANSACTIONS : BucketInitEvent.STORE_BYTES + 1] = stores
+        table[rows, [BucketInitEvent.STORE_TRANSACTIONS, BucketInitEvent.STORE_BYTES]] = stores
     stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
     return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))
 

@@ -45,8 +45,8 @@ def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
     table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
     for count in np.unique(grids):
         loads, stores = _block_traffic(int(count), simt)
-        table[grids == count, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = loads
-        table[grids == count, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = stores
+        table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] = loads
+        table[np.ix_(grids == count, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES])] = stores
     moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
     entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
     streams = (

@@ -50,8 +50,6 @@ _PART_TILES = 32  # tiles that one call of the worker takes, at least
 SMALLEST_WARP = 16  # lanes: 16 load a grid together
 
 _E = TileRasterEvent
-_HIT_WARPS = int(_E.HIT_WARPS)
-_Z_WARPS = int(_E.Z_WARPS)
 
 
 @kernel
@@ -79,7 +77,12 @@ def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
                     row[_E.BOX_WARPS] += box_warps(span, shape)
                     row[_E.BOX_LANES] += columns * rows
             if inside:
-                sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, _HIT_WARPS, _Z_WARPS)
+                counts = sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row)
+                if row is not None:
+                    row[_E.HIT_WARPS] += counts[0]
+                    row[_E.HIT_LANES] += counts[1]
+                    row[_E.Z_WARPS] += counts[2]
+                    row[_E.Z_LANES] += counts[3]
 
 
 @kernel

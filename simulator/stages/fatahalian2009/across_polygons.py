@@ -56,9 +56,6 @@ class AcrossPolygonsEvent(IntEnum):
     LOAD_BYTES = 12
 
 
-FIRST_ATOMIC = int(AcrossPolygonsEvent.ATOMIC_LANES)
-
-
 def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> Work:
     """Draw ``polygons`` into ``samples``.
 
@@ -201,4 +198,8 @@ def _step(samples, lanes, simt, row, addresses):
     if hits:
         row[AcrossPolygonsEvent.SAMPLE_HITS] += hits
         row[AcrossPolygonsEvent.HIT_WARPS] += 1
-        count_hits(row, FIRST_ATOMIC, samples, addresses, hits, simt.atomic_merge)
+        active_lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
+        row[AcrossPolygonsEvent.ATOMIC_LANES] += active_lanes
+        row[AcrossPolygonsEvent.ATOMIC_REQUESTS] += requests
+        row[AcrossPolygonsEvent.ATOMIC_CONFLICTS] += conflicts
+        row[AcrossPolygonsEvent.ATOMIC_DEPTH] += depth
