@@ -204,15 +204,15 @@ def _work(
     return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
 
 
-def _count_sort(rest: NDArray[np.int64], bins: int) -> None:
+def _count_sort(events: NDArray[np.int64], bins: int) -> None:
     """Count what each block does to sort the bins: runs of 16, then merges of runs twice as long each time."""
     E = CoarseRasterEvent
     warps = -(-bins // WARP)
     merges = max(-(-bins // 16) - 1, 0).bit_length()
-    rest[:, E.BIN_WARPS] = warps
-    rest[:, E.SORT_WARPS] = -(-max(bins // 2, 1) // WARP)
-    rest[:, E.SORT_MERGES] = merges
-    rest[:, E.SORT_STEPS] = warps * sum(4 + i for i in range(merges))
+    events[:, E.BIN_WARPS] = warps
+    events[:, E.SORT_WARPS] = -(-max(bins // 2, 1) // WARP)
+    events[:, E.SORT_MERGES] = merges
+    events[:, E.SORT_STEPS] = warps * sum(4 + i for i in range(merges))
 
 
 def _count_ends(
