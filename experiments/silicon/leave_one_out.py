@@ -46,7 +46,7 @@ def run(progress: Callable[[str], None]) -> Result:
             seen = [row for row in mine if row["scene"] != scene]
             left = [row for row in mine if row["scene"] == scene]
             factor = _factor(seen)
-            costs = _refit(kernel, seen)
+            costs = refit(kernel, seen)
             for row in left:
                 label = f"{scene} {row['W']}"
                 ours = _disassembled(kernel, row) + float(row["counts"] @ costs)
@@ -95,7 +95,7 @@ def _disassembled(kernel: str, row: dict[str, Any]) -> float:
     return float(row["ours"] - row["counts"] @ costs)
 
 
-def _refit(kernel: str, rows: list[dict[str, Any]]) -> NDArray[np.float64]:
+def refit(kernel: str, rows: list[dict[str, Any]]) -> NDArray[np.float64]:
     """Instructions of each fitted event, least squares of relative errors."""
     measured = np.array([row["instructions"] for row in rows])
     rest = np.array([_disassembled(kernel, row) for row in rows])

@@ -28,7 +28,7 @@ from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
     TILE_SEGMENT,
     TILES,
     CoarseInput,
-    _play_bin,
+    play_bin,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 from tilestamp.simulator.work import Work
@@ -54,8 +54,8 @@ class TileQueues(NamedTuple):
 
 @kernel
 def _play_part(part, _parts, given, order, counts, entries, events):
-    """Play one bin, with its own rows: see ``_play_bin``."""
-    _play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
+    """Play one bin, with its own rows: see ``play_bin``."""
+    play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
 
 
 def coarse_raster(
