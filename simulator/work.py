@@ -7,8 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.simulator.strata import Sample
 
 

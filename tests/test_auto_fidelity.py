@@ -11,8 +11,7 @@ from tilestamp.models.bounds import asked_of, bounds, longest
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.fidelity_bound import latest_end
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import list_machines, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.schedule import loads, played, schedule, start_up

@@ -8,8 +8,7 @@ import pytest
 from tilestamp.models.bounds import bounds
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch, Stream
+from tilestamp.models.launch import Launch, PipeLaunch, Stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.traffic import Traffic, traffic
