@@ -37,7 +37,7 @@ class Stream:
     asked_bytes: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Launch:
     """One kernel launch in machine events.
 
@@ -73,7 +73,7 @@ class Launch:
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PipeLaunch:
     """One pass through the fixed-function pipe.
 

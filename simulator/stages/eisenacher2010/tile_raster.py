@@ -223,13 +223,13 @@ def raster_streams(
 def _work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...]) -> Work:
     """Work of the kernel."""
     return Work(
-        "tile_raster",
-        "tile_raster",
-        _E,
-        table,
-        len(table),
-        shape.tile**2,
-        shared_bytes(shape),
+        stage="tile_raster",
+        kernel="tile_raster",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=shape.tile**2,
+        shared_bytes=shared_bytes(shape),
         streams=streams,
         variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )

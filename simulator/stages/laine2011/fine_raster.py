@@ -278,7 +278,16 @@ def fine_raster(
     if counting and release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
         queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
     work = Work(
-        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams, queue
+        stage="fine_raster",
+        kernel="fineRaster",
+        events=FineRasterEvent,
+        table=table,
+        grid=simt.sms,
+        block=32 * WARPS,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=queue,
     )
     return buffers, work
 

@@ -106,7 +106,14 @@ def fine_rasterizer(
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
     return out, Work(
-        "FineRasterizer", kernel, FineRasterizerEvent, table, len(table), 32 * group, shared, streams=streams
+        stage="FineRasterizer",
+        kernel=kernel,
+        events=FineRasterizerEvent,
+        table=table,
+        grid=len(table),
+        block=32 * group,
+        shared_bytes=shared,
+        streams=streams,
     )
 
 
