@@ -1,4 +1,4 @@
-"""``python -m tests.ledger [--cells]``: write the ledger of the frames; with ``--cells`` that of the experiments too."""
+"""``python -m tests.ledger [--cells]``: write the ledger of the frames; with ``--cells`` that of experiments too."""
 
 import sys
 
