@@ -31,6 +31,12 @@ WARP_BYTES = 128  # consecutive words of 32 lanes
 
 
 @kernel
+def smallest_transaction_bytes(rule: int) -> int:
+    """Bytes of the smallest transaction of a ``Coalescing`` rule: what a word that lies by itself costs."""
+    return SEGMENT_BYTES if rule == WARP_LINES else SECTOR_BYTES
+
+
+@kernel
 def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
     """Transactions of one memory instruction, and their bytes.
 
@@ -122,7 +128,7 @@ def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
 def _one_warp(start: int, size: int, rule: int) -> tuple[int, int]:
     """``contiguous`` for at most 128 bytes."""
     if rule != HALF_WARP_SEGMENTS:
-        segment = SEGMENT_BYTES if rule == WARP_LINES else SECTOR_BYTES
+        segment = smallest_transaction_bytes(rule)
         count = (start + size - 1) // segment - start // segment + 1
         return count, count * segment
     count = 0

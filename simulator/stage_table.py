@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter, by_name, counters_of
 from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.timing import Timing
 from tilestamp.simulator.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work

@@ -6,7 +6,7 @@ import pytest
 from tilestamp.experiments.silicon.cudaraster_blocks import CHAINS, LANES, RUNS, Run
 from tilestamp.experiments.silicon.cudaraster_mix import FITTED, chain, instructions
 from tilestamp.experiments.silicon.h200 import status
-from tilestamp.experiments.silicon.leave_one_out import _refit
+from tilestamp.experiments.silicon.leave_one_out import refit
 from tilestamp.experiments.silicon.mix_from_sass import RASTER, main
 from tilestamp.experiments.silicon.raster_sections import raster_sections
 from tilestamp.experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
@@ -108,19 +108,30 @@ def test_a_cost_is_found_again_from_the_scenes_that_are_left():
         {"instructions": 1000.0 + 7 * n, "ours": 1000.0 + FITTED["coarseRaster"]["ROUNDS"][0] * n, "counts": counts}
         for n, counts in ((10, np.array([10.0, 0.0])), (90, np.array([90.0, 0.0])))
     ]
-    assert _refit("coarseRaster", rows)[0] == pytest.approx(7)
+    assert refit("coarseRaster", rows)[0] == pytest.approx(7)
 
 
 def test_each_thread_of_a_block_stores_its_copy_of_the_parameters():
     table = np.zeros((3, len(BinRasterEvent)), np.int64)
-    copied = with_parameter_copy(Work("bin_raster", "binRaster", BinRasterEvent, table, 2, 512))
+    copied = with_parameter_copy(
+        Work(stage="bin_raster", kernel="binRaster", events=BinRasterEvent, table=table, grid=2, block=512)
+    )
     assert copied.table[:, BinRasterEvent.STORE_BYTES].tolist() == [664 * 512, 664 * 512, 0]
     assert copied.streams[-1].bytes == 2 * 664 * 512
 
 
 def _from_l2(machine, asked, footprint=32000):
     stream = Stream("vertices", "load", footprint, footprint, asked_bytes=asked)
-    launch = Launch("s", "k", 1, 64, 16, 0, np.zeros((1, EVENTS)), streams=(stream,))
+    launch = Launch(
+        stage="s",
+        kernel="k",
+        grid=1,
+        block=64,
+        registers=16,
+        shared_bytes=0,
+        events=np.zeros((1, EVENTS)),
+        streams=(stream,),
+    )
     return traffic([launch], load_machine(machine))[0].l2_bytes
 
 

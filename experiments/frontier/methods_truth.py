@@ -10,7 +10,6 @@ from tilestamp.experiments.frontier.methods_scenes import Subject
 from tilestamp.experiments.frontier.methods_variants import Variant
 from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.models.machine import load_machine
-from tilestamp.simulator.pipelines._cudaraster_image import shown_sample
 from tilestamp.simulator.reference.coverage import CENTRE, Visible, homogeneous_corners, screen_corners, visibility
 from tilestamp.simulator.reference.picture import exact_picture
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
@@ -18,7 +17,7 @@ from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
-from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
+from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN, shown_sample
 
 MICROPOLYGONS = ("stamps", "across-polygons", "bit-mask")  # white behind, a grey a polygon
 FINE_BOUND = 2.0  # pixels of a sub-patch of the reference: its micropolygons are two thirds of a pixel

@@ -46,14 +46,32 @@ def run(progress: Callable[[str], None]) -> Result:
             seen = [row for row in mine if row["scene"] != scene]
             left = [row for row in mine if row["scene"] == scene]
             factor = _factor(seen)
-            costs = _refit(kernel, seen)
+            costs = refit(kernel, seen)
             for row in left:
                 label = f"{scene} {row['W']}"
                 ours = _disassembled(kernel, row) + float(row["counts"] @ costs)
-                cells.append(Cell(label, f"{kernel} instructions", "", row["instructions"], ours, aim=AIM_INSTRUCTIONS))
+                cells.append(
+                    Cell(
+                        label,
+                        f"{kernel} instructions",
+                        "",
+                        published=row["instructions"],
+                        ours=ours,
+                        aim=AIM_INSTRUCTIONS,
+                    )
+                )
                 if row["us"] > SHORTEST_US:
-                    cells.append(Cell(label, f"{kernel} time", "us", row["us"], _at(row, factor), aim=AIM_TIME))
-    return Result("silicon-leave-one-out", "H200, one scene left out of the fit", SOURCE, cells, [], _notes(cells))
+                    cells.append(
+                        Cell(label, f"{kernel} time", "us", published=row["us"], ours=_at(row, factor), aim=AIM_TIME)
+                    )
+    return Result(
+        name="silicon-leave-one-out",
+        title="H200, one scene left out of the fit",
+        source=SOURCE,
+        cells=cells,
+        figures=[],
+        notes=_notes(cells),
+    )
 
 
 def _rows(machine: Machine, say: Callable[[str], None]) -> Iterator[dict[str, Any]]:
@@ -95,7 +113,7 @@ def _disassembled(kernel: str, row: dict[str, Any]) -> float:
     return float(row["ours"] - row["counts"] @ costs)
 
 
-def _refit(kernel: str, rows: list[dict[str, Any]]) -> NDArray[np.float64]:
+def refit(kernel: str, rows: list[dict[str, Any]]) -> NDArray[np.float64]:
     """Instructions of each fitted event, least squares of relative errors."""
     measured = np.array([row["instructions"] for row in rows])
     rest = np.array([_disassembled(kernel, row) for row in rows])

@@ -4,19 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
-from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
 from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.work import Work
-
-
-def shown_sample(samples: int) -> int:
-    """Sample nearest to the pixel's centre."""
-    rows = np.arange(samples)
-    columns = SAMPLE_COLUMN[samples.bit_length() - 1, :samples]
-    return int(np.argmin((2 * columns + 1 - samples) ** 2 + (2 * rows + 1 - samples) ** 2))
 
 
 def frame_image(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.pipelines._cudaraster_facts import REMARKS, first_room
@@ -17,7 +18,6 @@ from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
 from tilestamp.simulator.stages.laine2011.fine_raster import (
     MODES,
-    WARP_LINES,
     WARPS,
     count_starts,
     fine_raster,
@@ -93,7 +93,7 @@ def sampled_draw(
 
 def _started(table: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:
     """Add to the rows of all tiles what the warps do besides; in place."""
-    count_starts(table, WARPS * simt.sms, 128 if simt.coalescing == WARP_LINES else 32)
+    count_starts(table, WARPS * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
     return table
 
 

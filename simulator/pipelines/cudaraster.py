@@ -25,13 +25,13 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
     frame_facts,
     setup_counters,
 )
-from tilestamp.simulator.pipelines._cudaraster_image import frame_image, shown_sample, tile_maps
+from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
 from tilestamp.simulator.pipelines._cudaraster_sampled import sampled_draw
 from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
-from tilestamp.simulator.stages.laine2011.coverage import TILE
+from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
 from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from tilestamp.simulator.stages.laine2011.triangle_setup import (

@@ -17,7 +17,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
-from tilestamp.simulator.stages.liu2010.freepipe_triangle import Pieces, _start_edges, make_pieces
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import Pieces, make_pieces, start_edges
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import FixedFunctionWork
 
@@ -72,7 +72,7 @@ def _draw_strip(part, parts, pieces, bits, scale, cull, ids, depth, counts):
                 continue
             left = np.int64(box[0]) & -2
             for y in range(max(np.int64(box[2]) & -2, first_row), min(np.int64(box[3]) + 1, end_row), 2):
-                _start_edges(pieces.corner[p], bits, left, y, edge)
+                start_edges(pieces.corner[p], bits, left, y, edge)
                 for x in range(left, np.int64(box[1]) + 1, 2):
                     _quad(pieces, p, t, edge, x, y, box, end_row, bits, scale, ids, depth, counts[part])
                     for k in range(3):
@@ -196,4 +196,7 @@ def _work(
         Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
     )
     events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
-    return FixedFunctionWork("hardware", "draw", items, events, streams, SAMPLE_COUNTERS), rasterized
+    work = FixedFunctionWork(
+        stage="hardware", kernel="draw", items=items, events=events, streams=streams, counters=SAMPLE_COUNTERS
+    )
+    return work, rasterized

@@ -238,9 +238,17 @@ def init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
         size = int(sizes[rows.start or 0])
         stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
-        table[rows, BucketInitEvent.STORE_TRANSACTIONS : BucketInitEvent.STORE_BYTES + 1] = stores
+        table[rows, [BucketInitEvent.STORE_TRANSACTIONS, BucketInitEvent.STORE_BYTES]] = stores
     stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
-    return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))
+    return Work(
+        stage="bucket_count",
+        kernel="bucket_init",
+        events=BucketInitEvent,
+        table=table,
+        grid=len(sizes),
+        block=BLOCK,
+        streams=(stream,),
+    )
 
 
 def address_work(
@@ -264,12 +272,12 @@ def address_work(
         ),
     )
     return Work(
-        "bucket_count",
-        "address_calculation",
-        _E,
-        table,
-        len(table),
-        BLOCK,
+        stage="bucket_count",
+        kernel="address_calculation",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
         streams=streams,
         atomic_requests=requests,
         variant=tiles.variant + " aggregated" * aggregate,

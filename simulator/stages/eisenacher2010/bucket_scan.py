@@ -93,7 +93,16 @@ def _buffers(level: int) -> tuple[str, str]:
 
 def _work(kernel: str, size: int, table: NDArray[np.int64], shared_bytes: int, streams: tuple[Stream, ...]) -> Work:
     blocks = -(-size // ELEMENTS)
-    return Work("bucket_scan", kernel, _E, table, blocks, BLOCK, shared_bytes, streams=streams)
+    return Work(
+        stage="bucket_scan",
+        kernel=kernel,
+        events=_E,
+        table=table,
+        grid=blocks,
+        block=BLOCK,
+        shared_bytes=shared_bytes,
+        streams=streams,
+    )
 
 
 def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:
@@ -104,14 +113,14 @@ def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:
         elements = ELEMENTS if rows.start is None else size - (len(table) - 1) * ELEMENTS
         traffic = contiguous(0, elements * WORD_BYTES, int(simt.coalescing))
         table[rows, _E.LANES] = -(-elements * BLOCK // ELEMENTS)
-        table[rows, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = traffic
-        table[rows, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = traffic
+        table[rows, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = traffic
+        table[rows, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES]] = traffic
     return table
 
 
-def _add_word(table: NDArray[np.int64], transactions: _E, simt: Simt) -> None:
+def _add_word(table: NDArray[np.int64], columns: list[_E], simt: Simt) -> None:
     """One word more a block: its sum, stored by one lane or loaded by all."""
-    table[:, transactions : transactions + 2] += contiguous(0, WORD_BYTES, int(simt.coalescing))
+    table[:, columns] += contiguous(0, WORD_BYTES, int(simt.coalescing))
 
 
 def _scan_work(level: int, size: int, simt: Simt) -> Work:
@@ -129,7 +138,7 @@ def _scan_work(level: int, size: int, simt: Simt) -> Work:
     ]
     if len(table) > 1:
         before = int(table[:, _E.STORE_BYTES].sum())
-        _add_word(table, _E.STORE_TRANSACTIONS, simt)
+        _add_word(table, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES], simt)
         written = int(table[:, _E.STORE_BYTES].sum()) - before
         streams.append(Stream(f"SUMS{level + 1}", "store", written, len(table) * WORD_BYTES))
     return _work("scan_blocks", size, table, SHARED_BYTES, tuple(streams))
@@ -141,7 +150,7 @@ def _add_work(level: int, size: int, simt: Simt) -> Work:
     table[:, _E.BARRIER] = table[:, _E.WARPS]
     target = _buffers(level)[1]
     moved, nbytes = int(table[:, _E.LOAD_BYTES].sum()), size * WORD_BYTES
-    _add_word(table, _E.LOAD_TRANSACTIONS, simt)
+    _add_word(table, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES], simt)
     sums = int(table[:, _E.LOAD_BYTES].sum()) - moved
     streams = (
         Stream(target, "load", moved, nbytes),

@@ -147,7 +147,16 @@ def bucket_write(
     for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
     streams = write_streams(table, len(boxes), tiles, count)
     return lists, [
-        Work("bucket_write", "bucket_write", _E, table, len(table), BLOCK, streams=streams, variant=tiles.variant)
+        Work(
+            stage="bucket_write",
+            kernel="bucket_write",
+            events=_E,
+            table=table,
+            grid=len(table),
+            block=BLOCK,
+            streams=streams,
+            variant=tiles.variant,
+        )
     ]
 
 

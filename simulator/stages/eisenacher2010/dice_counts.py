@@ -45,8 +45,8 @@ def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
     table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
     for count in np.unique(grids):
         loads, stores = _block_traffic(int(count), simt)
-        table[grids == count, _E.LOAD_TRANSACTIONS : _E.LOAD_BYTES + 1] = loads
-        table[grids == count, _E.STORE_TRANSACTIONS : _E.STORE_BYTES + 1] = stores
+        table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] = loads
+        table[np.ix_(grids == count, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES])] = stores
     moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
     entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
     streams = (
@@ -55,7 +55,16 @@ def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
         Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES),
         Stream("boxes", "store", boxes, boxes),
     )
-    return Work("dice", "dice", _E, table, len(table), BLOCK, VERTICES * POINT_BYTES * per_block, streams=streams)
+    return Work(
+        stage="dice",
+        kernel="dice",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        shared_bytes=VERTICES * POINT_BYTES * per_block,
+        streams=streams,
+    )
 
 
 def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -168,7 +168,7 @@ def _blocks(threads: int) -> int:
 
 
 def _work(kernel: str, events: type[IntEnum], table: NDArray[np.int64], *streams: Stream) -> Work:
-    return Work(STAGE, kernel, events, table, len(table), BLOCK, streams=streams)
+    return Work(stage=STAGE, kernel=kernel, events=events, table=table, grid=len(table), block=BLOCK, streams=streams)
 
 
 def transform_work(patches: int, simt: Simt) -> Work:
@@ -182,10 +182,9 @@ def transform_work(patches: int, simt: Simt) -> Work:
     count, size = transactions(addresses, simt.warp, POINT_BYTES, int(simt.coalescing))
     half = transactions(addresses, simt.warp // 2, POINT_BYTES, int(simt.coalescing))
     odd = threads % simt.warp > 0  # points come by 16: the last warp may be half full
-    for column, whole, part in ((_T.LOAD_TRANSACTIONS, count, half[0]), (_T.LOAD_BYTES, size, half[1])):
-        moved = threads // simt.warp * whole + odd * part
-        table[:, column] = moved
-        table[:, column + 2] = moved
+    moved = np.outer(threads // simt.warp, (count, size)) + np.outer(odd, half)
+    table[:, [_T.LOAD_TRANSACTIONS, _T.LOAD_BYTES]] = moved
+    table[:, [_T.STORE_TRANSACTIONS, _T.STORE_BYTES]] = moved
     total, nbytes = int(table[:, _T.LOAD_BYTES].sum()), points * POINT_BYTES
     load, store = Stream("points", "load", total, nbytes), Stream("clip_points", "store", total, nbytes)
     return _work("transform", _T, table, load, store)

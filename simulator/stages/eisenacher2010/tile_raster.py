@@ -50,8 +50,6 @@ _PART_TILES = 32  # tiles that one call of the worker takes, at least
 SMALLEST_WARP = 16  # lanes: 16 load a grid together
 
 _E = TileRasterEvent
-_HIT_WARPS = int(_E.HIT_WARPS)
-_Z_WARPS = int(_E.Z_WARPS)
 
 
 @kernel
@@ -79,7 +77,12 @@ def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
                     row[_E.BOX_WARPS] += box_warps(span, shape)
                     row[_E.BOX_LANES] += columns * rows
             if inside:
-                sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, _HIT_WARPS, _Z_WARPS)
+                counts = sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row)
+                if row is not None:
+                    row[_E.HIT_WARPS] += counts[0]
+                    row[_E.HIT_LANES] += counts[1]
+                    row[_E.Z_WARPS] += counts[2]
+                    row[_E.Z_LANES] += counts[3]
 
 
 @kernel
@@ -216,13 +219,13 @@ def raster_streams(
 def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
     """Work of the kernel, a row a tile."""
     return Work(
-        "tile_raster",
-        "tile_raster",
-        _E,
-        table,
-        len(table),
-        shape.tile**2,
-        shared_bytes(shape),
+        stage="tile_raster",
+        kernel="tile_raster",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=shape.tile**2,
+        shared_bytes=shared_bytes(shape),
         streams=streams,
         variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )

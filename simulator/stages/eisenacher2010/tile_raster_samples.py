@@ -67,11 +67,10 @@ def sample_span(low, high, origin, side, samples):
 
 
 @kernel
-def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hit, passed):
+def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row):
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 
-    ``row[hit]``, ``row[hit + 1]`` count warps and lanes that cover a sample, ``row[passed]``, ``row[passed + 1]``
-    those that pass the z-test.
+    Returns the warps and lanes that cover a sample, and those that pass the z-test; 0 where ``row`` is None.
     """
     ax, ay, bx, by = vertices[grid, v, 0], vertices[grid, v, 1], vertices[grid, v + 1, 0], vertices[grid, v + 1, 1]
     cx, cy, dx, dy = (
@@ -82,6 +81,7 @@ def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hi
     )
     step = _ONE / np.float32(shape.side)
     mask = shape.tile - 1
+    hits = hit_warps = passed = passed_warps = 0
     hit_warp = passed_warp = -1  # the last warp that was counted: lanes come in order
     for j in range(span[2], span[3] + 1):
         y = np.float32(origin[1]) + (np.float32(j) + _HALF) * step
@@ -99,8 +99,8 @@ def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hi
             if row is not None:
                 samples.hits[j, i] += 1
                 of_warp = ((j & mask) * shape.tile + (i & mask)) >> shape.warp_bits
-                row[hit] += of_warp != hit_warp
-                row[hit + 1] += 1
+                hit_warps += of_warp != hit_warp
+                hits += 1
                 hit_warp = of_warp
             f = edge(ax, ay, cx, cy, x, y)
             if (f <= _ZERO) == (e0 + e1 + e2 + e3 >= _ZERO):  # which side of the diagonal
@@ -119,6 +119,7 @@ def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row, hi
                 )
                 if row is not None:
                     of_warp = ((j & mask) * shape.tile + (i & mask)) >> shape.warp_bits
-                    row[passed] += of_warp != passed_warp
-                    row[passed + 1] += 1
+                    passed_warps += of_warp != passed_warp
+                    passed += 1
                     passed_warp = of_warp
+    return hit_warps, hits, passed_warps, passed

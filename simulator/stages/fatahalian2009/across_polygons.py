@@ -58,9 +58,6 @@ class AcrossPolygonsEvent(IntEnum):
     LOAD_BYTES = 12
 
 
-FIRST_ATOMIC = int(AcrossPolygonsEvent.ATOMIC_LANES)
-
-
 def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> Work:
     """Draw ``polygons`` into ``samples``.
 
@@ -93,16 +90,16 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     )
     shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
     return Work(
-        "across_polygons",
-        "across_polygons",
-        events,
-        table,
-        blocks(simt, WARPS),
-        WARPS * simt.warp,
-        shared,
-        "warp_queue",
-        streams,
-        samples.requests,
+        stage="across_polygons",
+        kernel="across_polygons",
+        events=events,
+        table=table,
+        grid=blocks(simt, WARPS),
+        block=WARPS * simt.warp,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
 
 
@@ -201,4 +198,8 @@ def _step(samples, lanes, simt, row, addresses):
     if hits:
         row[AcrossPolygonsEvent.SAMPLE_HITS] += hits
         row[AcrossPolygonsEvent.HIT_WARPS] += 1
-        count_hits(row, FIRST_ATOMIC, samples, addresses, hits, simt.atomic_merge)
+        active_lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
+        row[AcrossPolygonsEvent.ATOMIC_LANES] += active_lanes
+        row[AcrossPolygonsEvent.ATOMIC_REQUESTS] += requests
+        row[AcrossPolygonsEvent.ATOMIC_CONFLICTS] += conflicts
+        row[AcrossPolygonsEvent.ATOMIC_DEPTH] += depth

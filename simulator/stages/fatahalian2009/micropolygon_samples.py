@@ -71,17 +71,14 @@ def keep_nearest(samples, x, y, s, depth, polygon):
 
 
 @kernel
-def count_hits(row, first, samples, addresses, hits, merge):
-    """Add one warp's atomic instruction to columns ``first``.. of a row: lanes, requests, conflicts, depth.
+def count_hits(samples, addresses, hits, merge):
+    """Count one warp's atomic instruction: lanes, requests, conflicts, depth.
 
     ``addresses`` begins with those of the ``hits`` lanes that hit, in lane order.
     """
-    active, requests, conflicts, depth = count_atomics(addresses, hits, merge)
-    row[first] += active
-    row[first + 1] += requests
-    row[first + 2] += conflicts
-    row[first + 3] += depth
+    counts = count_atomics(addresses, hits, merge)
     add_requests(addresses, hits, merge, 0, samples.requests)
+    return counts
 
 
 @kernel

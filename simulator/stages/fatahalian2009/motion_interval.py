@@ -47,7 +47,7 @@ def _draw(
 ) -> Work:
     table = np.zeros((-(-len(polygons.start) // CHUNK), len(MotionEvent)), np.int64)
     _motion_interval(polygons.start, polygons.end, polygons.blur, pattern, samples, intervals, table)
-    return Work("motion", kernel, MotionEvent, table, max(1, len(table)), BLOCK)
+    return Work(stage="motion", kernel=kernel, events=MotionEvent, table=table, grid=max(1, len(table)), block=BLOCK)
 
 
 @kernel

@@ -68,9 +68,6 @@ class StampsEvent(IntEnum):
     LOAD_BYTES = 17
 
 
-FIRST_ATOMIC = int(StampsEvent.ATOMIC_LANES)
-
-
 class StampShape(NamedTuple):
     """How stamps are laid and chosen: pixels, and pixels of the coarse stamp (0: one level)."""
 
@@ -115,7 +112,16 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
     )
     grid = blocks(simt, WARPS)
     return Work(
-        "stamps", "stamps", StampsEvent, table, grid, WARPS * simt.warp, 0, "warp_queue", streams, samples.requests
+        stage="stamps",
+        kernel="stamps",
+        events=StampsEvent,
+        table=table,
+        grid=grid,
+        block=WARPS * simt.warp,
+        shared_bytes=0,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
 
 
@@ -215,9 +221,18 @@ def _end_warp(samples, simt, row, addresses, used, hits):
         row[StampsEvent.TEST_WARPS] += 1
     if hits > 0:
         row[StampsEvent.SAMPLE_HITS] += hits
-        row[StampsEvent.HIT_WARPS] += 1
-        count_hits(row, FIRST_ATOMIC, samples, addresses, hits, simt.atomic_merge)
+        _count_hits(samples, addresses, hits, simt.atomic_merge, row)
     return 0, 0
+
+
+@kernel
+def _count_hits(samples, addresses, hits, merge, row):
+    lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, merge)
+    row[StampsEvent.HIT_WARPS] += 1
+    row[StampsEvent.ATOMIC_LANES] += lanes
+    row[StampsEvent.ATOMIC_REQUESTS] += requests
+    row[StampsEvent.ATOMIC_CONFLICTS] += conflicts
+    row[StampsEvent.ATOMIC_DEPTH] += depth
 
 
 @kernel
@@ -243,6 +258,5 @@ def _end_fill(samples, simt, row, addresses, used):
     if used > 0:
         row[StampsEvent.FILLED_SAMPLES] += used
         row[StampsEvent.FILLED_WARPS] += 1
-        row[StampsEvent.HIT_WARPS] += 1
-        count_hits(row, FIRST_ATOMIC, samples, addresses, used, simt.atomic_merge)
+        _count_hits(samples, addresses, used, simt.atomic_merge, row)
     return 0

@@ -20,7 +20,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import row_of
-from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, _play_batch
+from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, play_batch
 from tilestamp.simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
@@ -49,9 +49,9 @@ class BinQueues(NamedTuple):
 
 @kernel
 def _play_part(part, parts, given, batch, counts, entries, events):
-    """Play a share of the batches, each with its own rows: see ``_play_batch``."""
+    """Play a share of the batches, each with its own rows: see ``play_batch``."""
     for b in range(counts.shape[0] * part // parts, counts.shape[0] * (part + 1) // parts):
-        _play_batch(given, b, batch, counts[b], entries, row_of(events, b))
+        play_batch(given, b, batch, counts[b], entries, row_of(events, b))
 
 
 def bin_raster(
@@ -180,7 +180,17 @@ def _work(
         Stream("headers", "load", max(reads - counts, 0), visible * HEADER_BYTES),
         Stream("bin_queues", "store", writes, min(pairs * ENTRY_BYTES, segments * SEGMENT_BYTES)),
     )
-    return Work("bin_raster", "binRaster", BinRasterEvent, table, STREAMS, BLOCK, SHARED_BYTES, "block_queue", streams)
+    return Work(
+        stage="bin_raster",
+        kernel="binRaster",
+        events=BinRasterEvent,
+        table=table,
+        grid=STREAMS,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        dispatch="block_queue",
+        streams=streams,
+    )
 
 
 def _counters(work: Work) -> dict[str, tuple[int, int]]:

@@ -17,26 +17,26 @@ from tilestamp.simulator.stages.laine2011.bin_raster_count import (
     FAST,
     SINGLE,
     SLOW,
-    _count_atomic,
-    _count_bins,
-    _count_closing,
-    _count_load,
-    _count_longest,
-    _count_segments,
-    _count_visible,
+    count_atomic,
+    count_bins,
+    count_closing,
+    count_load,
+    count_longest,
+    count_segments,
+    count_visible,
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     BIN_SIDE_LOG2,
     SINGLE_TRIANGLE,
     WARP,
-    _entry_slot,
-    _header_load,
-    _lane_box,
-    _lane_edges,
-    _new_boxes,
-    _small_votes,
-    _touches,
-    _walk_votes,
+    entry_slot,
+    header_load,
+    lane_box,
+    lane_edges,
+    new_boxes,
+    small_votes,
+    touches,
+    walk_votes,
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 
@@ -104,8 +104,8 @@ def _read_step(given, ring, read, write, first, end, events):
         events[BinRasterEvent.OVERFLOWS] += go_on < last
         for start in range(first, last, WARP):  # a byte a lane
             segments = (min(start + WARP, last) - 1) // given.segment_bytes - start // given.segment_bytes + 1
-            _count_load(events, 1, segments, segments * given.segment_bytes)
-            _count_visible(given.subtriangles[start : min(start + WARP, last)], events)
+            count_load(events, 1, segments, segments * given.segment_bytes)
+            count_visible(given.subtriangles[start : min(start + WARP, last)], events)
     return go_on, write
 
 
@@ -115,9 +115,9 @@ def _load_warp(given, ring, first, lanes, boxes):
     largest, path = 1, SINGLE
     last_x, last_y = given.bins_x - 1, given.bins_y - 1
     for lane in range(lanes):
-        slot = _entry_slot(ring[(first + lane) % RING], given.misc)
+        slot = entry_slot(ring[(first + lane) % RING], given.misc)
         boxes.slot[lane] = slot
-        _lane_box(boxes, lane, given.headers[slot], given.half_x, given.half_y, BIN_SIDE_LOG2, last_x, last_y)
+        lane_box(boxes, lane, given.headers[slot], given.half_x, given.half_y, BIN_SIDE_LOG2, last_x, last_y)
         columns, rows = boxes.box[lane, 2], boxes.box[lane, 3]
         largest = max(largest, columns * rows)
         if columns > 2 or rows > 2:
@@ -126,7 +126,7 @@ def _load_warp(given, ring, first, lanes, boxes):
             path = FAST
     if path == SLOW:
         for lane in range(lanes):
-            _lane_edges(boxes, lane, given.headers[boxes.slot[lane]], given.half_x, given.half_y, BIN_SIDE_LOG2)
+            lane_edges(boxes, lane, given.headers[boxes.slot[lane]], given.half_x, given.half_y, BIN_SIDE_LOG2)
     return path, largest
 
 
@@ -139,7 +139,7 @@ def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, event
         step = 0
         for row in range(box[3]):
             for column in range(box[2]):
-                if path != SLOW or _touches(boxes, lane, column, row):
+                if path != SLOW or touches(boxes, lane, column, row):
                     b = box[0] + column + (box[1] + row) * given.bins_x
                     if entries is not None:
                         entries[counts[b]] = scratch.ring[(first + lane) % RING]
@@ -187,29 +187,29 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
     elif path == FAST:
         events[BinRasterEvent.FAST_WARPS] += 1
         events[BinRasterEvent.FAST_LANES] += lanes
-        ors, replays = _small_votes(boxes, lanes, given.bins_x)
+        ors, replays = small_votes(boxes, lanes, given.bins_x)
     else:
         events[BinRasterEvent.SLOW_WARPS] += 1
         events[BinRasterEvent.SLOW_LANES] += lanes
         events[BinRasterEvent.SLOW_STEPS] += largest
         events[BinRasterEvent.SLOW_LANE_STEPS] += area
-        ors, replays, ends = _walk_votes(boxes, lanes, largest, given.bins_x)
+        ors, replays, ends = walk_votes(boxes, lanes, largest, given.bins_x)
         events[BinRasterEvent.ROW_ENDS] += ends
     events[BinRasterEvent.WALK_STEPS] += largest
     events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
     events[BinRasterEvent.SHARED_ATOMIC] += ors
     events[BinRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
+    count_load(events, 1, *header_load(boxes.slot, lanes, given.segment_bytes))
 
 
 @kernel
-def _play_batch(given, b, batch, counts, entries, events):
+def play_batch(given, b, batch, counts, entries, events):
     """Bin the input triangles of batch b, of ``batch`` triangles.
 
     ``counts`` holds the next place of each bin: from 0 when counting (``entries`` None), into ``entries`` when filling.
     """
     first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
-    scratch, boxes = _new_scratch(counts.size, events is not None), _new_boxes()
+    scratch, boxes = _new_scratch(counts.size, events is not None), new_boxes()
     read = write = np.int64(0)  # literals that change in a loop have their callees compiled twice
     while True:
         while write - read < BLOCK and first < end:
@@ -229,14 +229,14 @@ def _play_batch(given, b, batch, counts, entries, events):
             events[BinRasterEvent.ROUNDS] += 1
             events[BinRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
             events[BinRasterEvent.TRIANGLES] += m
-            _count_bins(counts.size, events)
-            _count_longest(longest, steps, paths, events)
-            _count_segments(given, counts, scratch, events)
+            count_bins(counts.size, events)
+            count_longest(longest, steps, paths, events)
+            count_segments(given, counts, scratch, events)
         read += m
         if read == write and first >= end:
             break
     if events is not None:
         events[BinRasterEvent.BATCHES] += 1
         events[BinRasterEvent.CLOSED_SEGMENTS] += np.count_nonzero(counts)
-        _count_closing(given, counts, scratch, events)
-        _count_atomic(events, 1)
+        count_closing(given, counts, scratch, events)
+        count_atomic(events, 1)

@@ -11,14 +11,15 @@ SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x
 
 
 @kernel
-def _count_load(events, loads, segments, size):
+def count_load(events, loads, segments, size):
+    """Count loads, their transactions and bytes."""
     events[BinRasterEvent.LOAD] += loads
     events[BinRasterEvent.LOAD_TRANSACTIONS] += segments
     events[BinRasterEvent.LOAD_BYTES] += size
 
 
 @kernel
-def _count_atomic(events, executed):
+def count_atomic(events, executed):
     """One thread's global atomic: a draw, or the allocation of a round's segments."""
     events[BinRasterEvent.ATOMIC] += executed
     events[BinRasterEvent.ATOMIC_LANES] += executed
@@ -27,7 +28,7 @@ def _count_atomic(events, executed):
 
 
 @kernel
-def _count_visible(subtriangles, events):
+def count_visible(subtriangles, events):
     """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
     most = 0
     for n in subtriangles:
@@ -37,7 +38,7 @@ def _count_visible(subtriangles, events):
 
 
 @kernel
-def _count_bins(bins, events):
+def count_bins(bins, events):
     """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
     warps = (bins + WARP - 1) // WARP
     events[BinRasterEvent.BIN_WARPS] += warps
@@ -48,7 +49,7 @@ def _count_bins(bins, events):
 
 
 @kernel
-def _count_longest(walk, steps, paths, events):
+def count_longest(walk, steps, paths, events):
     """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
     events[BinRasterEvent.LONGEST_WALKS] += walk
     events[BinRasterEvent.LONGEST_SLOW] += steps
@@ -58,7 +59,7 @@ def _count_longest(walk, steps, paths, events):
 
 
 @kernel
-def _count_segments(given, counts, scratch, events):
+def count_segments(given, counts, scratch, events):
     """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
 
     Its link is written where the last one ends; the new one's own link and count stand beside those of its neighbours.
@@ -81,11 +82,11 @@ def _count_segments(given, counts, scratch, events):
     events[BinRasterEvent.ALLOC_WARPS] += warps
     events[BinRasterEvent.SHARED_ATOMIC] += warps
     events[BinRasterEvent.ALLOC_ROUNDS] += fresh > 0
-    _count_atomic(events, fresh > 0)
+    count_atomic(events, fresh > 0)
 
 
 @kernel
-def _count_closing(given, counts, scratch, events):
+def count_closing(given, counts, scratch, events):
     """Count the open segments at the end of a batch, and the writes of their counts."""
     for first in range(0, counts.size, WARP):
         closing, last = 0, -1

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import SECTOR_BYTES, SEGMENT_BYTES
+from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing, Simt
@@ -33,7 +33,8 @@ class WarpBoxes(NamedTuple):
 
 
 @kernel
-def _new_boxes():
+def new_boxes():
+    """Make room for the triangles of one warp."""
     return WarpBoxes(
         np.zeros(WARP, np.int64),
         np.zeros((WARP, 4), np.int64),
@@ -44,7 +45,7 @@ def _new_boxes():
 
 
 @kernel
-def _entry_slot(entry, misc):
+def entry_slot(entry, misc):
     """Slot of a queue entry: the triangle's own, or the sub-triangle's in the run that its header's word points to."""
     part = entry & 7
     if part == SINGLE_TRIANGLE:
@@ -53,7 +54,7 @@ def _entry_slot(entry, misc):
 
 
 @kernel
-def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
+def lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
     """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
     x0, y0, x1, y1, x2, y2 = (
         header[0] + dx,
@@ -72,7 +73,7 @@ def _lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
 
 
 @kernel
-def _lane_edges(boxes, lane, header, dx, dy, shift):
+def lane_edges(boxes, lane, header, dx, dy, shift):
     """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
     side = np.int64(1) << shift
     corner_x, corner_y = boxes.box[lane, 0] * side - dx, boxes.box[lane, 1] * side - dy
@@ -85,7 +86,7 @@ def _lane_edges(boxes, lane, header, dx, dy, shift):
 
 
 @kernel
-def _touches(boxes, lane, column, row):
+def touches(boxes, lane, column, row):
     """Whether the triangle touches the closed square (column, row) of its box: no edge has it wholly outside."""
     for k in range(3):
         if boxes.edge[lane, k] - column * boxes.step[lane, 2 * k + 1] + row * boxes.step[lane, 2 * k] < 0:
@@ -108,7 +109,7 @@ def _count_corner(boxes, lanes, stride, wide, high):
 
 
 @kernel
-def _small_votes(boxes, lanes, stride):
+def small_votes(boxes, lanes, stride):
     """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
     ors, replays = 0, 0
     for corner in range(4):
@@ -119,7 +120,7 @@ def _small_votes(boxes, lanes, stride):
 
 
 @kernel
-def _walk_votes(boxes, lanes, steps, stride):
+def walk_votes(boxes, lanes, steps, stride):
     """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
     ors, replays, ends = 0, 0, 0
     for step in range(steps):
@@ -131,7 +132,7 @@ def _walk_votes(boxes, lanes, steps, stride):
             if step < box[2] * box[3]:
                 column, row = step % box[2], step // box[2]
                 end |= column == box[2] - 1
-                if _touches(boxes, lane, column, row):
+                if touches(boxes, lane, column, row):
                     bank = (box[0] + column + (box[1] + row) * stride) & (WARP - 1)
                     boxes.bank[bank] += 1
                     deepest = max(deepest, boxes.bank[bank])
@@ -142,7 +143,7 @@ def _walk_votes(boxes, lanes, steps, stride):
 
 
 @kernel
-def _header_load(slot, lanes, segment_bytes):
+def header_load(slot, lanes, segment_bytes):
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
 
     The rule is that of ``models.coalescing``: distinct sectors of the warp, or distinct lines of each quarter-warp.
@@ -184,4 +185,4 @@ def transaction_bytes(simt: Simt, stage: str) -> int:
     """
     if simt.warp != WARP or simt.coalescing == Coalescing.HALF_WARP_SEGMENTS:
         raise TilestampError(f"{stage}: cudaraster votes over warps of 32 and needs compute capability 2.0 or later")
-    return SECTOR_BYTES if simt.coalescing == Coalescing.WARP_SECTORS else SEGMENT_BYTES
+    return int(smallest_transaction_bytes(int(simt.coalescing)))

@@ -28,7 +28,7 @@ from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
     TILE_SEGMENT,
     TILES,
     CoarseInput,
-    _play_bin,
+    play_bin,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 from tilestamp.simulator.work import Work
@@ -54,8 +54,8 @@ class TileQueues(NamedTuple):
 
 @kernel
 def _play_part(part, _parts, given, order, counts, entries, events):
-    """Play one bin, with its own rows: see ``_play_bin``."""
-    _play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
+    """Play one bin, with its own rows: see ``play_bin``."""
+    play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
 
 
 def coarse_raster(
@@ -201,18 +201,28 @@ def _work(
         ),
         Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
     )
-    return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
+    return Work(
+        stage="coarse_raster",
+        kernel="coarseRaster",
+        events=E,
+        table=table,
+        grid=simt.sms,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        dispatch="block_queue",
+        streams=streams,
+    )
 
 
-def _count_sort(rest: NDArray[np.int64], bins: int) -> None:
+def _count_sort(events: NDArray[np.int64], bins: int) -> None:
     """Count what each block does to sort the bins: runs of 16, then merges of runs twice as long each time."""
     E = CoarseRasterEvent
     warps = -(-bins // WARP)
     merges = max(-(-bins // 16) - 1, 0).bit_length()
-    rest[:, E.BIN_WARPS] = warps
-    rest[:, E.SORT_WARPS] = -(-max(bins // 2, 1) // WARP)
-    rest[:, E.SORT_MERGES] = merges
-    rest[:, E.SORT_STEPS] = warps * sum(4 + i for i in range(merges))
+    events[:, E.BIN_WARPS] = warps
+    events[:, E.SORT_WARPS] = -(-max(bins // 2, 1) // WARP)
+    events[:, E.SORT_MERGES] = merges
+    events[:, E.SORT_STEPS] = warps * sum(4 + i for i in range(merges))
 
 
 def _count_ends(

@@ -15,14 +15,14 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
     WARP,
-    _entry_slot,
-    _header_load,
-    _lane_box,
-    _lane_edges,
-    _new_boxes,
-    _small_votes,
-    _touches,
-    _walk_votes,
+    entry_slot,
+    header_load,
+    lane_box,
+    lane_edges,
+    new_boxes,
+    small_votes,
+    touches,
+    walk_votes,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 
@@ -83,10 +83,10 @@ def _load_warp(given, place, first, lanes, boxes):
     largest = 1
     low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
     for lane in range(lanes):
-        slot = _entry_slot(np.int64(given.entries[first + lane]), given.misc)
+        slot = entry_slot(np.int64(given.entries[first + lane]), given.misc)
         boxes.slot[lane] = slot
         header = given.headers[slot]
-        _lane_box(boxes, lane, header, place.move_x, place.move_y, TILE_SIDE_LOG2, place.last_x, place.last_y)
+        lane_box(boxes, lane, header, place.move_x, place.move_y, TILE_SIDE_LOG2, place.last_x, place.last_y)
         x, y, columns, rows = boxes.box[lane]
         small &= columns <= 2 and rows <= 2
         largest = max(largest, columns * rows)
@@ -96,7 +96,7 @@ def _load_warp(given, place, first, lanes, boxes):
     if small:
         return CASE_A, largest, union, rows
     for lane in range(lanes):
-        _lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
+        lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
     return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, rows
 
 
@@ -107,7 +107,7 @@ def _emit_warp(case, boxes, lanes, counts, queues):
         box = boxes.box[lane]
         for row in range(box[3]):
             for column in range(box[2]):
-                if case == CASE_A or _touches(boxes, lane, column, row):
+                if case == CASE_A or touches(boxes, lane, column, row):
                     tile = box[0] + column + (box[1] + row) * BIN_TILES
                     if queues is not None:
                         queues[counts[tile]] = boxes.slot[lane]
@@ -126,7 +126,7 @@ def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
     ors, replays = 0, 0
     if case == CASE_A:
         events[CoarseRasterEvent.CASE_A_WARPS] += 1
-        ors, replays = _small_votes(boxes, lanes, BIN_TILES)
+        ors, replays = small_votes(boxes, lanes, BIN_TILES)
     elif case == CASE_B:
         events[CoarseRasterEvent.CASE_B_WARPS] += 1
         events[CoarseRasterEvent.CASE_B_STEPS] += union
@@ -137,10 +137,10 @@ def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
         events[CoarseRasterEvent.CASE_C_WARPS] += 1
         events[CoarseRasterEvent.CASE_C_STEPS] += largest
         events[CoarseRasterEvent.CASE_C_LANE_STEPS] += area
-        ors, replays, _ = _walk_votes(boxes, lanes, largest, BIN_TILES)
+        ors, replays, _ = walk_votes(boxes, lanes, largest, BIN_TILES)
     events[CoarseRasterEvent.SHARED_ATOMIC] += ors
     events[CoarseRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *_header_load(boxes.slot, lanes, given.segment_bytes))
+    _count_load(events, 1, *header_load(boxes.slot, lanes, given.segment_bytes))
 
 
 @kernel
@@ -242,13 +242,13 @@ def _count_merge(given, b, events):
 
 
 @kernel
-def _play_bin(given, b, counts, queues, events):
+def play_bin(given, b, counts, queues, events):
     """Find the tiles of a bin's entries.
 
     ``counts`` (256,) holds the next place of each tile: from 0 when counting (``queues`` None), into ``queues`` when
     filling.
     """
-    boxes, place = _new_boxes(), _place(given, b)
+    boxes, place = new_boxes(), _place(given, b)
     before, tails = np.zeros(TILES, np.int64), np.zeros(TILES + 1, np.int64)
     start, end = given.starts[b], given.starts[b + 1]
     if events is not None:

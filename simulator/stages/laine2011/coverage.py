@@ -133,3 +133,10 @@ def centroid_sample(mask: Any, log_samples: int) -> Any:
         if (mask >> i) & 1 and distance < nearest:
             best, nearest = i, distance
     return best
+
+
+def shown_sample(samples: int) -> int:
+    """Sample nearest to the pixel's centre."""
+    rows = np.arange(samples)
+    columns = SAMPLE_COLUMN[samples.bit_length() - 1, :samples]
+    return int(np.argmin((2 * columns + 1 - samples) ** 2 + (2 * rows + 1 - samples) ** 2))

@@ -9,9 +9,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
-from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
@@ -44,7 +45,6 @@ MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colou
     "depth-only": (True, False, False, False),
     "color": (False, False, True, False),
 }
-WARP_LINES = int(Coalescing.WARP_LINES)
 START_LOADS = 3  # of a warp that starts: whether a buffer was too small
 DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
@@ -88,20 +88,22 @@ def _count_tile(draw: Draw, row: Any) -> None:
     Surfaces are laid out in two dimensions, so that a row of a tile is one 32-byte segment on every machine. Samples
     stay in memory: with several of them the clear writes the tile, and nothing else here does.
     """
-    for column in (23, 24, 25, 26):
-        row[column] += 1
-    row[27] += 2  # the tile's number and its first segment
-    row[28] += 2 * (128 if draw.coalescing == WARP_LINES else 32)
+    row[FineRasterEvent.ATOMIC] += 1
+    row[FineRasterEvent.ATOMIC_LANES] += 1
+    row[FineRasterEvent.ATOMIC_REQUESTS] += 1
+    row[FineRasterEvent.ATOMIC_DEPTH] += 1
+    row[FineRasterEvent.LOAD_TRANSACTIONS] += 2  # the tile's number and its first segment
+    row[FineRasterEvent.LOAD_BYTES] += 2 * smallest_transaction_bytes(draw.coalescing)
     surfaces = (1 if draw.write_color or draw.later_wins else 0) + 1
     rows = surfaces * TILE << draw.log_samples
     if not draw.clear and draw.log_samples == 0:
-        row[21] += 1
-        row[27] += rows
-        row[28] += 32 * rows
+        row[FineRasterEvent.TILE_LOADS] += 1
+        row[FineRasterEvent.LOAD_TRANSACTIONS] += rows
+        row[FineRasterEvent.LOAD_BYTES] += 32 * rows
     if draw.clear or draw.log_samples == 0:
-        row[22] += 1
-        row[29] += rows
-        row[30] += 32 * rows
+        row[FineRasterEvent.TILE_STORES] += 1
+        row[FineRasterEvent.STORE_TRANSACTIONS] += rows
+        row[FineRasterEvent.STORE_BYTES] += 32 * rows
 
 
 @kernel
@@ -262,14 +264,23 @@ def fine_raster(
             True if samples > 1 else None, table if counting else None,
         )  # fmt: skip
     if counting and starts:
-        count_starts(table, WARPS * simt.sms, 128 if draw.coalescing == WARP_LINES else 32)
+        count_starts(table, WARPS * simt.sms, smallest_transaction_bytes(draw.coalescing))
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
     streams = fine_streams(table, setup, len(tile_entries), width, height, samples)
     queue = None
     if counting and release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
         queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
     work = Work(
-        "fine_raster", "fineRaster", FineRasterEvent, table, simt.sms, 32 * WARPS, shared, "warp_queue", streams, queue
+        stage="fine_raster",
+        kernel="fineRaster",
+        events=FineRasterEvent,
+        table=table,
+        grid=simt.sms,
+        block=32 * WARPS,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=queue,
     )
     return buffers, work
 

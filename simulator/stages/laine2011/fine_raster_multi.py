@@ -18,6 +18,7 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     UPDATE,
     ZMAX,
     Draw,
+    FineRasterEvent,
     Tile,
     refill,
     take,
@@ -59,12 +60,12 @@ def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bot
         tile.pixel[kept], tile.slot[kept], tile.mask[kept] = p, slot, mask
         kept += 1
     if row is not None:
-        row[7] += 1
-        row[8] += n
-        row[9] += killed
-        row[10] += n - kept - killed
-        row[17] += n << s
-        row[18] += hits
+        row[FineRasterEvent.FRAGMENT_ROUNDS] += 1
+        row[FineRasterEvent.FRAGMENT_LANES] += n
+        row[FineRasterEvent.Z_KILLS] += killed
+        row[FineRasterEvent.MSAA_KILLS] += n - kept - killed
+        row[FineRasterEvent.SAMPLE_TESTS] += n << s
+        row[FineRasterEvent.SAMPLE_HITS] += hits
     return kept
 
 
@@ -141,12 +142,12 @@ def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, 
         written |= bit if (tile.mask[lane] >> sample) & 1 else 0
     rows = popcount(np.uint64(read)) if draw.depth else 0
     rows += longest * popcount(np.uint64(written)) if draw.blend else 0
-    row[27] += rows
-    row[28] += 32 * rows
+    row[FineRasterEvent.LOAD_TRANSACTIONS] += rows
+    row[FineRasterEvent.LOAD_BYTES] += 32 * rows
     rows = longest * popcount(np.uint64(written)) if draw.write_color else 0
     rows += popcount(np.uint64(written)) if draw.depth and longest > 0 else 0
-    row[29] += rows
-    row[30] += 32 * rows
+    row[FineRasterEvent.STORE_TRANSACTIONS] += rows
+    row[FineRasterEvent.STORE_BYTES] += 32 * rows
 
 
 @kernel
@@ -169,18 +170,18 @@ def draw_tile_multi(
             count_reads(setup, draw, tile, n, np.int64(0b0001), row)
         kept = _cull_fragments(setup, draw, tile, n, left, bottom, row)
         if row is not None and kept > 0:
-            row[11] += 1
-            row[12] += kept
+            row[FineRasterEvent.SHADE_ROUNDS] += 1
+            row[FineRasterEvent.SHADE_LANES] += kept
             count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
         if draw.write_color:
             _shade_survivors(setup, colors, draw, tile, kept, shaded, column, line)
         for sample in range(samples):
             writes, longest = _rop(setup, draw, tile, kept, sample, shaded, column, line)
             if row is not None and writes > 0:
-                row[13] += longest
-                row[14] += writes
-                row[15] += kept
-                row[16] += kept * longest
+                row[FineRasterEvent.ROP_STEPS] += longest
+                row[FineRasterEvent.ROP_LANES] += writes
+                row[FineRasterEvent.BLEND_LANES] += kept
+                row[FineRasterEvent.BLEND_ROUND_LANES] += kept * longest
             if row is not None and kept > 0:
                 _count_sample(draw, tile, kept, sample, longest, row)
         if draw.depth:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tilestamp.models.coalescing import transactions
+from tilestamp.models.coalescing import contiguous, smallest_transaction_bytes, transactions
 from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
@@ -19,6 +19,7 @@ PIXELS = TILE * TILE
 SEGMENT = 32  # entries of a tile's list that are read together
 QUEUE = 64  # triangles with fragments left
 WARP = 32
+ENTRY_BYTES = 4
 HEADER_BYTES = 16
 
 
@@ -131,15 +132,15 @@ def update_zmax(depths: Any, state: Any, row: Any) -> None:
         state[ZMAX] = depths[:PIXELS].max()
         state[UPDATE] = 0
         if row is not None:
-            row[6] += 1
+            row[FineRasterEvent.ZMAX_UPDATES] += 1
 
 
 @kernel
 def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     """Count a load of ``size`` bytes by each of n lanes at ``tile.addresses``."""
     count, read = transactions(tile.addresses, n, size, draw.coalescing)
-    row[27] += count
-    row[28] += read
+    row[FineRasterEvent.LOAD_TRANSACTIONS] += count
+    row[FineRasterEvent.LOAD_BYTES] += read
 
 
 @kernel
@@ -170,22 +171,20 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
         state[FRAGMENTS] += popcount(mask)
     if row is not None:
         n = last - first
-        row[0] += 1
-        row[1] += n
-        row[2] += n if draw.depth else 0
-        row[3] += killed
-        row[4] += n - killed
-        row[5] += empty
-        row[17] += PIXELS * (n - killed)
-        row[33] += state[TAIL] > queued
-        row[34] += state[TAIL] - queued
-        row[35] += n < SEGMENT
-        row[36] += 1
-        lists = 1 if draw.coalescing != 3 else (n + 7) // 8  # the entries, up to 128 bytes in a line of their own
-        row[27] += lists
-        row[28] += lists * (32 if draw.coalescing == 3 else 4 * SEGMENT)
-        row[27] += 2  # the segment's count and the next segment
-        row[28] += 2 * (HEADER_BYTES * 2 if draw.coalescing != 2 else 128)
+        row[FineRasterEvent.SEGMENTS] += 1
+        row[FineRasterEvent.ENTRY_LANES] += n
+        row[FineRasterEvent.EARLY_Z_LANES] += n if draw.depth else 0
+        row[FineRasterEvent.EARLY_Z_KILLS] += killed
+        row[FineRasterEvent.COVERAGE_LANES] += n - killed
+        row[FineRasterEvent.EMPTY_MASKS] += empty
+        row[FineRasterEvent.SAMPLE_TESTS] += PIXELS * (n - killed)
+        row[FineRasterEvent.FULL_SEGMENTS] += state[TAIL] > queued
+        row[FineRasterEvent.FULL_LANES] += state[TAIL] - queued
+        row[FineRasterEvent.PARTIAL_SEGMENTS] += n < SEGMENT
+        row[FineRasterEvent.LIST_WARPS] += 1
+        loads, size = contiguous(0, n * ENTRY_BYTES, draw.coalescing)  # the entries, in a line of their own
+        row[FineRasterEvent.LOAD_TRANSACTIONS] += loads + 2  # and the segment's count and the next segment
+        row[FineRasterEvent.LOAD_BYTES] += size + 2 * smallest_transaction_bytes(draw.coalescing)
         count_gather(tile, n, HEADER_BYTES, draw, row)
 
 
@@ -199,7 +198,7 @@ def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom
         tile.masks[i] = tile.masks[state[HEAD] + i]
     state[HEAD], state[TAIL] = 0, queued
     if row is not None:
-        row[32] += 1
+        row[FineRasterEvent.REFILLS] += 1
     while state[FRAGMENTS] < WARP and state[NEXT] < state[END]:
         read_segment(setup, entries, draw, tile, left, bottom, row)
 

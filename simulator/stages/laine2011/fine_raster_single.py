@@ -15,6 +15,7 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     UPDATE,
     ZMAX,
     Draw,
+    FineRasterEvent,
     Tile,
     count_gather,
     refill,
@@ -105,21 +106,21 @@ def count_reads(setup: Setup, draw: Draw, tile: Tile, n: int, words: int, row: A
 
 @kernel
 def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes: int, longest: Any, row: Any) -> None:
-    row[7] += 1
-    row[8] += n
-    row[9] += n - kept
-    row[18] += n
+    row[FineRasterEvent.FRAGMENT_ROUNDS] += 1
+    row[FineRasterEvent.FRAGMENT_LANES] += n
+    row[FineRasterEvent.Z_KILLS] += n - kept
+    row[FineRasterEvent.SAMPLE_HITS] += n
     if kept == 0:
         return
-    row[11] += 1
-    row[12] += kept
-    row[13] += longest
-    row[14] += writes
-    row[15] += kept
-    row[16] += kept * longest
+    row[FineRasterEvent.SHADE_ROUNDS] += 1
+    row[FineRasterEvent.SHADE_LANES] += kept
+    row[FineRasterEvent.ROP_STEPS] += longest
+    row[FineRasterEvent.ROP_LANES] += writes
+    row[FineRasterEvent.BLEND_LANES] += kept
+    row[FineRasterEvent.BLEND_ROUND_LANES] += kept * longest
     if draw.later_wins:
-        row[19] += 2
-        row[20] += 2 * _conflicts(tile, kept)
+        row[FineRasterEvent.SHARED_ATOMIC] += 2
+        row[FineRasterEvent.BANK_REPLAYS] += 2 * _conflicts(tile, kept)
     else:
         count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
 
@@ -146,6 +147,6 @@ def draw_tile_single(
         kept = _depth_test(setup, draw, tile, n, column, line) if draw.depth else n
         writes, longest = _rop(setup, colors, draw, tile, kept, column, line)
         if row is not None:
-            row[37] += 1
-            row[38] += queued
+            row[FineRasterEvent.TAG_WARPS] += 1
+            row[FineRasterEvent.TAG_LANES] += queued
             _count_round(setup, draw, tile, n, kept, writes, longest, row)

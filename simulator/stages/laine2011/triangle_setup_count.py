@@ -57,7 +57,10 @@ _E = TriangleSetupEvent
 _ACCESSES = 12  # three indices and three positions, loaded; count, header and four parts of a record, stored
 _LOADS = 6
 _STEP_COLUMNS = np.array([_E.SNAP_WARPS, _E.STORE_STEPS, _E.CLIP_WARPS, *[_E.CLIP_STEPS] * 6, _E.FAN_STEPS])
-"""Columns of what the longest lane of a warp decides; the column that follows counts lanes."""
+"""Columns of what the longest lane of a warp decides."""
+
+_LANE_COLUMNS = np.array([_E.SNAP_LANES, _E.STORE_LANES, _E.CLIP_LANES, *[_E.CLIP_STEP_LANES] * 6, _E.FAN_LANES])
+"""Columns of the lanes in each of them."""
 
 _PATH_WARPS = np.array([_E.OUTSIDE_WARPS, _E.CULLED_WARPS, _E.SITE_WARPS])
 
@@ -94,7 +97,7 @@ def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, 
     value[0], value[1], value[2], value[9] = 1, kept, 1, fan
     columns = 2  # snap and store
     if outcome > 0:
-        row[_E.SNAP_LANES + outcome] += 1
+        row[_E.BACKFACE_CULLED if outcome == 1 else _E.BETWEEN_CULLED] += 1
     elif outcome < 0:
         columns = _STEP_COLUMNS.size
         for p in range(6):
@@ -104,9 +107,8 @@ def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, 
             row[_E.STORE_TRANSACTIONS] += 2 * kept + 1  # header and record in slots of its own, and where those are
             row[_E.STORE_BYTES] += 32 * (2 * kept + 1)
     for i in range(columns):
-        column = _STEP_COLUMNS[i]
-        row[column + 1] += value[i]
-        row[column] += max(value[i] - longest[i], 0)
+        row[_LANE_COLUMNS[i]] += value[i]
+        row[_STEP_COLUMNS[i]] += max(value[i] - longest[i], 0)
         longest[i] = max(longest[i], value[i])
 
 
@@ -189,6 +191,9 @@ def count_warp(
                 known[0], known[1] = count, moved
         else:
             count, moved = known[0], known[1]
-        column = _E.LOAD_TRANSACTIONS if access < _LOADS else _E.STORE_TRANSACTIONS
-        row[column] += count
-        row[column + 1] += moved
+        if access < _LOADS:
+            row[_E.LOAD_TRANSACTIONS] += count
+            row[_E.LOAD_BYTES] += moved
+        else:
+            row[_E.STORE_TRANSACTIONS] += count
+            row[_E.STORE_BYTES] += moved

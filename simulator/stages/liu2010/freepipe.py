@@ -29,11 +29,11 @@ from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     SUBPIXEL_BITS,
     Pieces,
-    _fixed_depth,
-    _start_edges,
+    fixed_depth,
     make_pieces,
+    start_edges,
 )
-from tilestamp.simulator.stages.liu2010.freepipe_warp import WARP, FrameShape, _blocks
+from tilestamp.simulator.stages.liu2010.freepipe_warp import WARP, FrameShape, draw_blocks
 from tilestamp.simulator.work import Work
 
 Packing = Literal["64", "32"]
@@ -70,7 +70,7 @@ def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
             box = pieces.box[p]
             if box[1] < box[0] or box[3] < first_row or box[2] >= end_row:
                 continue
-            _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], edge)
+            start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], edge)
             row_depth = pieces.depth[p, 0]
             for y in range(box[2], min(np.int64(box[3]) + 1, end_row)):
                 if y >= first_row:
@@ -79,7 +79,7 @@ def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
                         pixel[k] = edge[k]
                     for x in range(box[0], box[1] + 1):
                         if pixel[0] | pixel[1] | pixel[2] >= 0:
-                            fixed = _fixed_depth(depth)
+                            fixed = fixed_depth(depth)
                             if halves is not None:
                                 _keep_halves(frame, halves, tied, y, x, np.uint64(fixed >> 12), t, colors)
                             else:
@@ -235,7 +235,7 @@ def _make_work(
     table = np.zeros((blocks, len(FreePipeEvent)), np.int64)
     chunks = np.zeros((workers, -(-size // CHUNK_BYTES)), np.int64)
     words = np.full(pixels, EMPTY, np.uint64) if early else None
-    for_parts(_blocks, workers, triangles, pieces, block, shape, simt, table, chunks, words)
+    for_parts(draw_blocks, workers, triangles, pieces, block, shape, simt, table, chunks, words)
     requests = chunks.sum(axis=0)
     E = FreePipeEvent
     served = CHUNK_BYTES * int(table[:, E.ATOMIC_REQUESTS].sum())
@@ -256,4 +256,13 @@ def freepipe_work(
 ) -> Work:
     """Work of the kernel, a row a block."""
     kernel = "freepipe_early" if early else "freepipe"
-    return Work("freepipe", kernel, FreePipeEvent, table, len(table), block, 0, "blocks", streams, requests)
+    return Work(
+        stage="freepipe",
+        kernel=kernel,
+        events=FreePipeEvent,
+        table=table,
+        grid=len(table),
+        block=block,
+        streams=streams,
+        atomic_requests=requests,
+    )

@@ -171,7 +171,7 @@ def _project_part(part, parts, positions, triangles, width, height, bits, pieces
 
 
 @kernel
-def _start_edges(corner, bits, x, y, edge):
+def start_edges(corner, bits, x, y, edge):
     """Edge functions at the centre of pixel (x, y), less one where the edge does not own its points."""
     half = np.int64(1) << (bits - 1)
     center_x, center_y = (np.int64(x) << bits) + half, (np.int64(y) << bits) + half
@@ -184,7 +184,7 @@ def _start_edges(corner, bits, x, y, edge):
 
 
 @kernel
-def _fixed_depth(z):
+def fixed_depth(z):
     """NDC depth to 32 bits of fixed point, 0 nearest."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)
     if not unit >= _F0:  # NaN saturates to 0

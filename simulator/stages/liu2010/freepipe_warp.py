@@ -18,8 +18,8 @@ from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     CLIPPED,
     INSIDE,
     SUBPIXEL_BITS,
-    _fixed_depth,
-    _start_edges,
+    fixed_depth,
+    start_edges,
 )
 
 WARP = 32
@@ -88,7 +88,7 @@ def _start_rows(pieces, lanes):
         if p >= 0:
             active += 1
             box = pieces.box[p]
-            _start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
+            start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
             lanes.row_depth[lane] = pieces.depth[p, 0]
             if box[1] >= box[0] and box[3] >= box[2]:
                 boxes += 1
@@ -144,7 +144,7 @@ def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
         if f[0] | f[1] | f[2] >= 0:
             lanes.address[hits] = first * word_bytes
             if ids:
-                lanes.value[hits] = np.uint64(_fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
+                lanes.value[hits] = np.uint64(fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
             hits += 1
         for k in range(3):
             f[k] -= lanes.row[lane, 4 + 2 * k]
@@ -285,7 +285,7 @@ def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, fram
 
 
 @kernel
-def _blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
+def draw_blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
     """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
     lanes = _new_lanes()
     for b in range(part, table.shape[0], parts):

@@ -67,11 +67,11 @@ def shading_work(
     table[:, event.BLOCKS] = 1
     table[:, event.WARPS] = BLOCK // simt.warp
     table[:, event.WARP_LANES] = BLOCK
-    for warps, covered in ((event.DRAWN_WARPS, shaded), (event.TEXTURED_WARPS, textured)):
+    drawn_columns = [event.DRAWN_WARPS, event.DRAWN_LANES, event.DRAWN_BLOCKS]
+    textured_columns = [event.TEXTURED_WARPS, event.TEXTURED_LANES, event.TEXTURED_BLOCKS]
+    for columns, covered in ((drawn_columns, shaded), (textured_columns, textured)):
         lanes = covered.sum(axis=1).reshape(-1, 2)
-        table[:, warps] = (lanes > 0).sum(axis=1)
-        table[:, warps + 1] = lanes.sum(axis=1)
-        table[:, warps + 2] = lanes.any(axis=1)
+        table[:, columns] = np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1), lanes.any(axis=1)], axis=1)
     lines, footprint = _texel_lines(textures, uvs, chains)
     texels = BILINEAR_TEXELS if texture_filter == "bilinear" else 1
     texel_lines = texels * TEXEL_BYTES * lines.reshape(-1, 2).sum(axis=1)
@@ -94,7 +94,15 @@ def shading_work(
         Stream("colors", "store", 12 * fragments, 12 * fragments),
     )
     kernel = f"fragment_shading_{texture_filter}"
-    return Work("fragment_shading", kernel, event, table, len(table), BLOCK, streams=streams)
+    return Work(
+        stage="fragment_shading",
+        kernel=kernel,
+        events=event,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        streams=streams,
+    )
 
 
 def _by_warp(pixels: NDArray[Any]) -> NDArray[Any]:

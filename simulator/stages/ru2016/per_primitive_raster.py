@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
@@ -112,15 +113,15 @@ def per_primitive_raster(
         ),
     )
     work = Work(
-        "per_primitive_raster", "per_primitive_raster", PerPrimitiveEvent, events, blocks, BLOCK,
-        streams=streams, atomic_requests=requests, variant="textured" if textured else "",
+        stage="per_primitive_raster", kernel="per_primitive_raster", events=PerPrimitiveEvent, table=events,
+        grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests, variant="textured" if textured else "",
     )  # fmt: skip
     return Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race, work
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, textured: bool) -> None:
     """Each lane reads its own primitive and writes its own fragment, a segment of its own for each word."""
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     words = WRITE_WORDS + (TEXTURE_WORDS if textured else 0)
     reads = (
         events[:, PerPrimitiveEvent.WARP_LANES] * START_LOADS

@@ -7,7 +7,7 @@ import numpy as np
 from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.borrow import borrow, row_of
-from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK
+from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
 
 RACE_ROUNDS = 3  # assumed
@@ -81,9 +81,10 @@ def _wave(
     if events is not None:
         for w in range(count):
             row = events[(first + w) * warp // BLOCK]
-            row[3] += seen[w, 0]  # BOX_STEPS
-            for k in range(3):
-                row[17 + k] = max(row[17 + k], seen[w, k])  # LONGEST, LONGEST_HITS, LONGEST_WRITES
+            row[PerPrimitiveEvent.BOX_STEPS] += seen[w, 0]
+            row[PerPrimitiveEvent.LONGEST] = max(row[PerPrimitiveEvent.LONGEST], seen[w, 0])
+            row[PerPrimitiveEvent.LONGEST_HITS] = max(row[PerPrimitiveEvent.LONGEST_HITS], seen[w, 1])
+            row[PerPrimitiveEvent.LONGEST_WRITES] = max(row[PerPrimitiveEvent.LONGEST_WRITES], seen[w, 2])
     return rounds + s
 
 
@@ -114,11 +115,11 @@ def _boxes(
         t = drawable[first + lane]
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
         if row is not None:
-            row[1] += 1  # WARP_LANES
+            row[PerPrimitiveEvent.WARP_LANES] += 1
         size = area(x0, y0, x1, y1, x2, y2)
         if (culling and size <= _ZERO) or size == _ZERO:
             if row is not None:
-                row[2] += 1  # CULLED
+                row[PerPrimitiveEvent.CULLED] += 1
             continue
         left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, shape[1], shape[0])
         if left > right or top > bottom:
@@ -134,7 +135,7 @@ def _boxes(
             shapes[lane, 7 + k] = screen[triangles[t, k], 2]
         shapes[lane, 6] = _ONE / size
     if row is not None:
-        row[0] += 1  # WARPS
+        row[PerPrimitiveEvent.WARPS] += 1
 
 
 @kernel(error_model="numpy")
@@ -173,8 +174,8 @@ def _step(
             nearest[y, x] = boxes[w, lane, 4]
         hits += 1
     if row is not None:
-        row[4] += tests  # SAMPLE_TESTS
-        row[5] += hits  # SAMPLE_HITS
+        row[PerPrimitiveEvent.SAMPLE_TESTS] += tests
+        row[PerPrimitiveEvent.SAMPLE_HITS] += hits
     return hits
 
 
@@ -191,8 +192,8 @@ def _write(boxes: Any, w: int, pixels: Any, who: Any, wins: Any, raced: Any, lan
             landed[y, x] = lands
             raced[y, x] = boxes[w, who[i], 4]
     if row is not None and written > 0:
-        row[11] += 1  # WRITES
-        row[12] += written
+        row[PerPrimitiveEvent.WRITES] += 1
+        row[PerPrimitiveEvent.WRITE_LANES] += written
     return min(written, 1)
 
 
@@ -201,9 +202,9 @@ def _count_atomics(pixels: Any, merge: int, row: Any, requests: Any) -> None:
     for i in range(len(pixels)):
         pixels[i] *= 4  # bytes
     lanes, merged, conflicts, depth = count_atomics(pixels, len(pixels), merge)
-    row[6] += 1
-    row[7] += lanes
-    row[8] += merged
-    row[9] += conflicts
-    row[10] += depth
+    row[PerPrimitiveEvent.ATOMIC] += 1
+    row[PerPrimitiveEvent.ATOMIC_LANES] += lanes
+    row[PerPrimitiveEvent.ATOMIC_REQUESTS] += merged
+    row[PerPrimitiveEvent.ATOMIC_CONFLICTS] += conflicts
+    row[PerPrimitiveEvent.ATOMIC_DEPTH] += depth
     add_requests(pixels, len(pixels), merge, 0, requests)

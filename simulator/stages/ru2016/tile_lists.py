@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
@@ -92,7 +93,7 @@ def tile_lists(
         lost = fill(*shape, int(simt.atomic_merge), room, limits, sizes, entries, requests, events)
         _add_primitive_loads(events, simt)
         return sizes, lost, Work(
-            "tile_lists", kernel, TileListEvent, events, blocks, BLOCK,
+            stage="tile_lists", kernel=kernel, events=TileListEvent, table=events, grid=blocks, block=BLOCK,
             streams=_streams(events, len(drawable), tiles), atomic_requests=requests,
         )  # fmt: skip
 
@@ -112,7 +113,7 @@ def _scan(tiles: int, simt: Simt) -> Work:
 
 def _add_primitive_loads(events: NDArray[np.int64], simt: Simt) -> None:
     """Two words of three vertices 64 bytes apart, of primitives 200 bytes apart: every lane a segment of its own."""
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     loads = events[:, TileListEvent.WARP_LANES] * COORDINATES
     events[:, TileListEvent.LOAD_TRANSACTIONS] += loads
     events[:, TileListEvent.LOAD_BYTES] += loads * segment

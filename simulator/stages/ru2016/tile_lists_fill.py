@@ -99,12 +99,12 @@ def fill(
             steps += columns
             if events is not None:
                 for lane in range(warp):
-                    events[first // BLOCK, 4] += boxes[lane, 1] if y < boxes[lane, 3] else 0  # BOX_LANES
+                    events[first // BLOCK, TileListEvent.BOX_LANES] += boxes[lane, 1] if y < boxes[lane, 3] else 0
         if events is not None:
             row = events[first // BLOCK]
-            row[3] += steps  # BOX_STEPS
-            row[16] = max(row[16], steps)  # LONGEST
-            row[17] = max(row[17], waits)  # LONGEST_APPENDS
+            row[TileListEvent.BOX_STEPS] += steps
+            row[TileListEvent.LONGEST] = max(row[TileListEvent.LONGEST], steps)
+            row[TileListEvent.LONGEST_APPENDS] = max(row[TileListEvent.LONGEST_APPENDS], waits)
     return lost
 
 
@@ -169,10 +169,10 @@ def _boxes(
         t = drawable[first + lane]
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
         if events is not None:
-            events[first // BLOCK, 1] += 1  # WARP_LANES
+            events[first // BLOCK, TileListEvent.WARP_LANES] += 1
         if culling and area(x0, y0, x1, y1, x2, y2) <= _ZERO:
             if events is not None:
-                events[first // BLOCK, 2] += 1  # CULLED
+                events[first // BLOCK, TileListEvent.CULLED] += 1
             continue
         left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, width, height)
         if left > right or top > bottom:
@@ -184,7 +184,7 @@ def _boxes(
         boxes[lane, 4] = t
         most = max(most, boxes[lane, 3])
     if events is not None:
-        events[first // BLOCK, 0] += 1  # WARPS
+        events[first // BLOCK, TileListEvent.WARPS] += 1
     return most
 
 
@@ -192,14 +192,14 @@ def _boxes(
 def _count_append(addresses: Any, places: Any, warp: int, rule: int, merge: int, row: Any, requests: Any) -> None:
     """Count one warp's atomicAdd on the counters and the stores of the entries."""
     lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)
-    row[5] += 1  # APPENDS
-    row[6] += lanes
-    row[7] += 1  # ATOMIC
-    row[8] += lanes
-    row[9] += merged
-    row[10] += conflicts
-    row[11] += depth
+    row[TileListEvent.APPENDS] += 1
+    row[TileListEvent.APPEND_LANES] += lanes
+    row[TileListEvent.ATOMIC] += 1
+    row[TileListEvent.ATOMIC_LANES] += lanes
+    row[TileListEvent.ATOMIC_REQUESTS] += merged
+    row[TileListEvent.ATOMIC_CONFLICTS] += conflicts
+    row[TileListEvent.ATOMIC_DEPTH] += depth
     add_requests(addresses, warp, merge, 0, requests)
     count, size = transactions(places, warp, COUNTER_WORD, rule)
-    row[14] += count  # STORE_TRANSACTIONS
-    row[15] += size
+    row[TileListEvent.STORE_TRANSACTIONS] += count
+    row[TileListEvent.STORE_BYTES] += size

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import transactions
+from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
 from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -100,15 +100,16 @@ def _tile(
                     visible[y_first + y, x_first + x] = t
                 if row is not None:
                     w = (y * tile + x) // warp
-                    row[4] += 1  # SAMPLE_HITS
+                    row[TiledRasterEvent.SAMPLE_HITS] += 1
                     marks[0, w] = 1
                     if nearer:
-                        row[7] += 1  # NEARER_LANES
+                        row[TiledRasterEvent.NEARER_LANES] += 1
                         marks[1, w] = 1
         if row is not None:
             for w in range(marks.shape[1]):
+                row[TiledRasterEvent.HIT_WARPS] += marks[0, w]
+                row[TiledRasterEvent.NEARER_WARPS] += marks[1, w]
                 for k in range(2):
-                    row[5 + k] += marks[k, w]  # HIT_WARPS, NEARER_WARPS
                     marks[2 + k, w] += marks[k, w]
                     marks[k, w] = 0
 
@@ -128,13 +129,13 @@ def _band(
         row = None if events is None else events[i]
         _tile(screen, triangles, listed, column * tile, tile_row * tile, tile, warp, visible, depth, marks, row)
         if events is not None:
-            events[i, 0] = warps
-            events[i, 1] = tile * tile
-            events[i, 2] = warps * len(listed)
-            events[i, 3] = tile * tile * len(listed)
-            events[i, 8] = len(listed)
-            events[i, 13] = marks[2].max()  # LONGEST_HITS
-            events[i, 14] = marks[3].max()  # LONGEST_NEARER
+            events[i, TiledRasterEvent.WARPS] = warps
+            events[i, TiledRasterEvent.WARP_LANES] = tile * tile
+            events[i, TiledRasterEvent.TEST_WARPS] = warps * len(listed)
+            events[i, TiledRasterEvent.SAMPLE_TESTS] = tile * tile * len(listed)
+            events[i, TiledRasterEvent.ENTRIES] = len(listed)
+            events[i, TiledRasterEvent.LONGEST_HITS] = marks[2].max()
+            events[i, TiledRasterEvent.LONGEST_NEARER] = marks[3].max()
             marks[:] = 0
 
 
@@ -199,12 +200,20 @@ def tiled_raster(
 
 def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...] = ()) -> Work:
     """Work of the kernel, a row and a block a tile, a thread a pixel."""
-    return Work("tiled_raster", "tiled_raster", TiledRasterEvent, table, len(table), tile * tile, streams=streams)
+    return Work(
+        stage="tiled_raster",
+        kernel="tiled_raster",
+        events=TiledRasterEvent,
+        table=table,
+        grid=len(table),
+        block=tile * tile,
+        streams=streams,
+    )
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
     """All lanes read the same words, a transaction each; fragments are stored word by word, 56 bytes apart."""
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     reads = (
         events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
         + events[:, TiledRasterEvent.HIT_WARPS] * HIT_LOADS

@@ -72,9 +72,6 @@ class BitMaskEvent(IntEnum):
     LOAD_BYTES = 21
 
 
-FIRST_ATOMIC = int(BitMaskEvent.ATOMIC_LANES)
-
-
 def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> Work:
     """Draw ``polygons`` into ``samples`` with a mask a patch.
 
@@ -111,7 +108,16 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
     return Work(
-        "bit_mask", "bit_mask", BitMaskEvent, table, grid, block, shared, "warp_queue", streams, samples.requests
+        stage="bit_mask",
+        kernel="bit_mask",
+        events=BitMaskEvent,
+        table=table,
+        grid=grid,
+        block=block,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
 
 
@@ -209,7 +215,11 @@ def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
     if hits:
         row[BitMaskEvent.SAMPLE_HITS] += hits
         row[BitMaskEvent.HIT_WARPS] += 1
-        count_hits(row, FIRST_ATOMIC, samples, addresses, hits, simt.atomic_merge)
+        active_lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
+        row[BitMaskEvent.ATOMIC_LANES] += active_lanes
+        row[BitMaskEvent.ATOMIC_REQUESTS] += requests
+        row[BitMaskEvent.ATOMIC_CONFLICTS] += conflicts
+        row[BitMaskEvent.ATOMIC_DEPTH] += depth
         _write_mask(mask, words, bits, hits, shared, row)
     return active > 0
 

@@ -92,19 +92,19 @@ def _tile_of_warp(
         passed += 1
         low, high = _depth_range(planes[p, DEPTH], left, bottom)
         if cached + HI_Z_MARGIN < low:
-            row[7] += 1  # HI_Z_REJECTED
+            row[CoarseRasterizerEvent.HI_Z_REJECTED] += 1
             continue
         if covers:
             updates += 1
             hi_z[tile] = min(hi_z[tile], high)
         masks[tile, lane] = True
-    row[3] += tested > 0
-    row[4] += tested
-    row[5] += passed > 0
-    row[6] += passed
-    row[8] += updates
-    row[11] += updates > 0  # SHARED_ATOMIC
-    row[12] += max(0, updates - 1)  # BANK_REPLAYS: one address
+    row[CoarseRasterizerEvent.EDGE_STEPS] += tested > 0
+    row[CoarseRasterizerEvent.EDGE_LANES] += tested
+    row[CoarseRasterizerEvent.HI_Z_STEPS] += passed > 0
+    row[CoarseRasterizerEvent.HI_Z_LANES] += passed
+    row[CoarseRasterizerEvent.HI_Z_UPDATES] += updates
+    row[CoarseRasterizerEvent.SHARED_ATOMIC] += updates > 0
+    row[CoarseRasterizerEvent.BANK_REPLAYS] += max(0, updates - 1)  # one address
 
 
 @kernel(error_model="numpy")
@@ -119,11 +119,11 @@ def rasterize_bin(
     for first in range(0, len(queue), warp):
         listed = queue[first : first + warp]
         if first % BLOCK == 0:
-            row[0] += 1  # ROUNDS
+            row[CoarseRasterizerEvent.ROUNDS] += 1
             slowest = 0
-        before = row[5]
-        row[1] += 1
-        row[2] += len(listed)
+        before = row[CoarseRasterizerEvent.HI_Z_STEPS]
+        row[CoarseRasterizerEvent.WARPS] += 1
+        row[CoarseRasterizerEvent.WARP_LANES] += len(listed)
         low_x, low_y, high_x, high_y = _tiles_of(boxes, listed, origin_x, origin_y)
         for y in range(low_y, high_y + 1):
             for x in range(low_x, high_x + 1):
@@ -133,7 +133,7 @@ def rasterize_bin(
                 for lane in range(len(listed)):
                     if masks[tile, lane]:
                         masks[tile, lane] = False
-                        row[10] += 1  # ENTRIES
+                        row[CoarseRasterizerEvent.ENTRIES] += 1
                         if entries is not None:
                             entries[cursors[tile]] = listed[lane]
                             cursors[tile] += 1
@@ -141,8 +141,10 @@ def rasterize_bin(
                             counts[tile] += 1
                 if not use_hi_z:
                     hi_z[tile] = NO_DEPTH
-        row[23] += max(0, row[5] - before - slowest)  # CRITICAL_HI_Z_STEPS
-        slowest = max(slowest, row[5] - before)
+        row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += max(
+            0, row[CoarseRasterizerEvent.HI_Z_STEPS] - before - slowest
+        )
+        slowest = max(slowest, row[CoarseRasterizerEvent.HI_Z_STEPS] - before)
 
 
 @kernel(error_model="numpy")

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -102,7 +103,14 @@ def coarse_rasterizer(
     )
     kernel = "CoarseRasterizer" if unrolled else "CoarseRasterizer_before"
     return TileQueues(starts, entries, columns * TILES_A_ROW), Work(
-        "CoarseRasterizer", kernel, CoarseRasterizerEvent, events, len(events), BLOCK, SHARED_BYTES, streams=streams
+        stage="CoarseRasterizer",
+        kernel=kernel,
+        events=CoarseRasterizerEvent,
+        table=events,
+        grid=len(events),
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=streams,
     )
 
 
@@ -120,7 +128,7 @@ def _fills(bins: BinQueues, columns: int, rows: int) -> NDArray[np.int64]:
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], sub_queues: int, simt: Simt) -> None:
     """Add what follows from the counts: appends, one atomicAdd a round, memory."""
     event = CoarseRasterizerEvent
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     appended = counts.reshape(len(counts), -1, simt.warp)
     events[:, event.APPEND_STEPS] = appended.max(axis=2).sum(axis=1)  # at least: lanes of a warp seldom share a step
     events[:, event.CRITICAL_APPEND_STEPS] = appended.max(axis=(1, 2))

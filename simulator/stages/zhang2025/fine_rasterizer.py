@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -94,17 +95,25 @@ def fine_rasterizer(
     total = table.sum(axis=0)
     pixels = width * height
     drawn = len(np.unique(tiles.entries))
+    written = 4 * FRAGMENT_BYTES * int(total[FineRasterizerEvent.QUADS])
     streams = (
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),
         Stream("setup", "load", 160 * int(total[FineRasterizerEvent.ROUND_LANES]), drawn * SETUP_BYTES),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments", "store", 4 * FRAGMENT_BYTES * int(total[7]), 4 * FRAGMENT_BYTES * int(total[7])),
+        Stream("fragments", "store", written, written),
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
     return out, Work(
-        "FineRasterizer", kernel, FineRasterizerEvent, table, len(table), 32 * group, shared, streams=streams
+        stage="FineRasterizer",
+        kernel=kernel,
+        events=FineRasterizerEvent,
+        table=table,
+        grid=len(table),
+        block=32 * group,
+        shared_bytes=shared,
+        streams=streams,
     )
 
 
@@ -127,7 +136,7 @@ def _by_block(events: NDArray[np.int64], group: int) -> NDArray[np.int64]:
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
     """Add what follows from the counts: one atomicAdd a round, memory."""
     event = FineRasterizerEvent
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     rounds, quads = events[..., event.ROUNDS], events[..., event.QUADS]
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[..., name] = rounds

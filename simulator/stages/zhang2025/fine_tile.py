@@ -102,7 +102,7 @@ def rasterize_tile(
     """One tile: its primitives in rounds of a warp."""
     hits = np.zeros(TILE * TILE, np.int64)
     columns, rows = min(TILE, depth.shape[1] - left), min(TILE, depth.shape[0] - bottom)
-    row[0] += 1  # WARPS
+    row[FineRasterizerEvent.WARPS] += 1
     for first in range(0, len(queue), warp):
         end = min(len(queue), first + warp)
         hits[:] = 0
@@ -112,17 +112,17 @@ def rasterize_tile(
             mask = coverage(edges[p], left, bottom, columns, rows)
             masks[i] = _early_z(planes[p, DEPTH], mask, left, bottom, depth, hits, early_z)
             written[i - first] = quad_mask(masks[i])
-        row[1] += 1  # ROUNDS
-        row[2] += end - first
-        row[3] += TILE * TILE * (end - first)
+        row[FineRasterizerEvent.ROUNDS] += 1
+        row[FineRasterizerEvent.ROUND_LANES] += end - first
+        row[FineRasterizerEvent.SAMPLE_TESTS] += TILE * TILE * (end - first)
         for i in range(TILE * TILE):
-            row[4] += hits[i]
-            row[5] += hits[i] > 0
-            row[8] += hits[i] > 0
-            row[9] += max(0, hits[i] - 1)
-        row[6] += _quad_steps(written, optimized)
+            row[FineRasterizerEvent.SAMPLE_HITS] += hits[i]
+            row[FineRasterizerEvent.EARLY_Z_STEPS] += hits[i] > 0
+            row[FineRasterizerEvent.SHARED_ATOMIC] += hits[i] > 0
+            row[FineRasterizerEvent.BANK_REPLAYS] += max(0, hits[i] - 1)
+        row[FineRasterizerEvent.QUAD_STEPS] += _quad_steps(written, optimized)
         for lane in range(warp):
-            row[7] += _bits(written[lane])
+            row[FineRasterizerEvent.QUADS] += _bits(written[lane])
 
 
 @kernel(error_model="numpy")

@@ -144,7 +144,15 @@ def pixel_shader(
         Stream("pixel_base", "atomic", 16 * count, min(16 * count, 4 * pixels)),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
-    return stream, Work("PixelShader", kernel, PixelShaderEvent, events, blocks, BLOCK, streams=streams)
+    return stream, Work(
+        stage="PixelShader",
+        kernel=kernel,
+        events=PixelShaderEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
 
 
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:

@@ -134,12 +134,12 @@ def shade_block(
                 _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
                 textured += 4
         if row is not None:
-            row[0] += 1
-            row[1] += 4 * (end - warp)
+            row[PixelShaderEvent.WARPS] += 1
+            row[PixelShaderEvent.WARP_LANES] += 4 * (end - warp)
             loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
-            row[3] += loads
-            row[4] += loads * textured
+            row[PixelShaderEvent.TEXEL_LOADS] += loads
+            row[PixelShaderEvent.TEXEL_LANES] += loads * textured
             for n in range(loads):
                 count, size = transactions(addresses[n], 4 * QUADS_A_WARP, TEXEL_BYTES, rule)
-                row[5] += count
-                row[6] += size
+                row[PixelShaderEvent.TEXTURE_TRANSACTIONS] += count
+                row[PixelShaderEvent.TEXTURE_BYTES] += size

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.atomics import count_atomics
-from tilestamp.models.coalescing import transactions
+from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -114,10 +114,10 @@ def _primitive_assembly(
             used += count > 3
         if events is not None:
             row = events[t // BLOCK]
-            row[1] += 1  # WARP_LANES
-            row[2] += count > 3  # CLIPPED
-            row[3] += pieces == 0  # CULLED
-            row[4] += max(1, count - 2)  # PIECES
+            row[PrimitiveAssemblyEvent.WARP_LANES] += 1
+            row[PrimitiveAssemblyEvent.CLIPPED] += count > 3
+            row[PrimitiveAssemblyEvent.CULLED] += pieces == 0
+            row[PrimitiveAssemblyEvent.PIECES] += max(1, count - 2)
     return used
 
 
@@ -127,21 +127,21 @@ def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int
     addresses = np.empty(warp, np.int64)
     for first in range(0, len(triangles), warp):
         row = events[first // BLOCK]
-        row[0] += 1  # WARPS
+        row[PrimitiveAssemblyEvent.WARPS] += 1
         for k in range(3):
             for lane in range(warp):
                 addresses[lane] = triangles[first + lane, k] * VERTEX_BYTES if first + lane < len(triangles) else -1
             count, size = transactions(addresses, warp, 4, rule)
-            row[10] += count * (VERTEX_BYTES // 4)
-            row[11] += size * (VERTEX_BYTES // 4)
+            row[PrimitiveAssemblyEvent.LOAD_TRANSACTIONS] += count * (VERTEX_BYTES // 4)
+            row[PrimitiveAssemblyEvent.LOAD_BYTES] += size * (VERTEX_BYTES // 4)
         for lane in range(warp):
             addresses[lane] = 0 if first + lane < len(triangles) and clipped[first + lane] else -1
         lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)
-        row[5] += lanes > 0
-        row[6] += lanes
-        row[7] += merged
-        row[8] += conflicts
-        row[9] += depth
+        row[PrimitiveAssemblyEvent.ATOMIC] += lanes > 0
+        row[PrimitiveAssemblyEvent.ATOMIC_LANES] += lanes
+        row[PrimitiveAssemblyEvent.ATOMIC_REQUESTS] += merged
+        row[PrimitiveAssemblyEvent.ATOMIC_CONFLICTS] += conflicts
+        row[PrimitiveAssemblyEvent.ATOMIC_DEPTH] += depth
 
 
 def primitive_assembly(
@@ -176,7 +176,7 @@ def primitive_assembly(
     events = np.zeros((blocks, len(PrimitiveAssemblyEvent)), np.int64)
     used = _primitive_assembly(*vertices, mesh.triangles, np.float32(width), np.float32(height), culling, *out, events)
     _count_memory(mesh.triangles, crossing, simt.warp, int(simt.coalescing), int(simt.atomic_merge), events)
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     stores = events[:, PrimitiveAssemblyEvent.PIECES] * (PRIMITIVE_BYTES // 4)  # a lane's words lie 112 bytes apart
     events[:, PrimitiveAssemblyEvent.STORE_TRANSACTIONS] = stores
     events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
@@ -185,5 +185,13 @@ def primitive_assembly(
         Stream("primitives", "store", used * PRIMITIVE_BYTES, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
-    work = Work(stage, stage, PrimitiveAssemblyEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveAssemblyEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
     return Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), work

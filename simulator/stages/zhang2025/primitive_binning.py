@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -81,7 +82,7 @@ def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: 
         steps = max(steps, (right - left + 1) * (top - bottom + 1))
         if p % warp == warp - 1 or p == len(boxes) - 1:
             if events is not None:
-                events[p // BLOCK, 2] += steps  # BIN_STEPS
+                events[p // BLOCK, PrimitiveBinningEvent.BIN_STEPS] += steps
             steps = 0
 
 
@@ -134,18 +135,32 @@ def primitive_binning(
     _add_costs(events, counts, len(boxes), simt)
     total = events.sum(axis=0)
     streams = (
-        Stream("compacted", "load", int(total[10]), len(boxes) * PRIMITIVE_BYTES),
-        Stream("bin_queue", "store", int(total[12]), 4 * len(entries) + 8 * MAX_BINS * work_blocks),
+        Stream("compacted", "load", int(total[PrimitiveBinningEvent.LOAD_BYTES]), len(boxes) * PRIMITIVE_BYTES),
+        Stream(
+            "bin_queue",
+            "store",
+            int(total[PrimitiveBinningEvent.STORE_BYTES]),
+            4 * len(entries) + 8 * MAX_BINS * work_blocks,
+        ),
     )
     stage = "PrimitiveBinning"
-    work = Work(stage, stage, PrimitiveBinningEvent, events, blocks, BLOCK, SHARED_BYTES, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveBinningEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=streams,
+    )
     return BinQueues(starts, entries), work
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives: int, simt: Simt) -> None:
     """Add what follows from the counts: chunks, one atomicAdd a block, memory."""
     event = PrimitiveBinningEvent
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     working = events[: len(counts)]
     lanes = np.clip(primitives - BLOCK * np.arange(len(events)), 0, BLOCK)
     events[:, event.WARPS] = BLOCK // simt.warp

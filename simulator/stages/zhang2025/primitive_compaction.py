@@ -9,6 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.machine import Machine
 from tilestamp.models.occupancy import residency
@@ -54,7 +55,7 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
     warps = BLOCK // simt.warp
     copies = np.bincount(kept // BLOCK, minlength=blocks)
     ids = record_transactions(Access("primitives", PRIMITIVE_BYTES, 1), simt)
-    segment = 128 if simt.coalescing == 2 else 32
+    segment = smallest_transaction_bytes(int(simt.coalescing))
     words = copies * (PRIMITIVE_BYTES // 4)
     events[:, PrimitiveCompactionEvent.WARPS] = warps
     events[:, PrimitiveCompactionEvent.KEPT] = copies
@@ -70,7 +71,15 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
         Stream("compacted", "store", len(kept) * PRIMITIVE_BYTES, len(kept) * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveCompaction"
-    work = Work(stage, stage, PrimitiveCompactionEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveCompactionEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
     return Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), work
 
 

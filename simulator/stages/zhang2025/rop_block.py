@@ -55,7 +55,7 @@ def _gather(
                 kept[at] = head
                 count += 1
             elif row is not None:
-                row[7] += 1  # LOST
+                row[RopEvent.LOST] += 1
         head = links[head]
     return count
 
@@ -108,12 +108,12 @@ def resolve_block(
             blended = max(blended, count)
             sorted_steps = max(sorted_steps, count * (count - 1) // 2)
             if row is not None:
-                row[3] += lane[0]
-                row[6] += count
-                row[12] += count > 0 and winners[y, x] < 0
+                row[RopEvent.LIST_LANES] += lane[0]
+                row[RopEvent.BLEND_LANES] += count
+                row[RopEvent.HOLES] += count > 0 and winners[y, x] < 0
         if row is not None and live:
-            row[0] += 1
-            row[1] += live
-            row[2] += walked
-            row[4] += sorted_steps
-            row[5] += blended
+            row[RopEvent.WARPS] += 1
+            row[RopEvent.WARP_LANES] += live
+            row[RopEvent.LIST_STEPS] += walked
+            row[RopEvent.SORT_STEPS] += sorted_steps
+            row[RopEvent.BLEND_STEPS] += blended
