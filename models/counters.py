@@ -43,6 +43,11 @@ class Counter:
     events: tuple[str, ...]
 
     @property
+    def event(self) -> str:
+        """The event; of a ratio, the part."""
+        return next(iter(self.events))
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names of its columns."""
         return (f"{self.name}_mean", f"{self.name}_max") if self.kind == "distribution" else (self.name,)

@@ -142,7 +142,7 @@ class Run:
         """Of one launch."""
         counts = intervals.count_intervals(work)
         known = {name: intervals.exactly(0) for name, counter in self.counters.items() if counter.kind == "count"}
-        known |= {counter.name: counts[counter.events[0]] for counter in work.counters if counter.kind == "count"}
+        known |= {counter.name: counts[counter.event] for counter in work.counters if counter.kind == "count"}
         if isinstance(work, Work):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)

@@ -135,7 +135,7 @@ class Sampler:
             replace(work, table=rows, streams=()), self.machine.sm.warp_size
         )
         asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
-        counts = [rows[:, work.events[counter.events[0]]] for counter in work.counters if counter.kind == "count"]
+        counts = [rows[:, work.events[counter.event]] for counter in work.counters if counter.kind == "count"]
         instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
         return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)
 

@@ -51,7 +51,7 @@ def declared(works: Sequence[Work | FixedFunctionWork]) -> dict[str, Counter]:
     return by_name(counter for work in works for counter in work.counters)
 
 
-def _declared(works: Sequence[Work | FixedFunctionWork], counters: Mapping[str, Counter]) -> dict[str, float]:
+def declared_columns(works: Sequence[Work | FixedFunctionWork], counters: Mapping[str, Counter]) -> dict[str, float]:
     """Columns of all that any stage declares, for one stage."""
     counts: dict[str, int] = {}
     for work in works:
@@ -61,7 +61,7 @@ def _declared(works: Sequence[Work | FixedFunctionWork], counters: Mapping[str, 
     columns: dict[str, float] = {}
     for name, counter in counters.items():
         if name in own:
-            event = own[name].events[0]
+            event = own[name].event
             columns |= own[name].values(counts, [each for work in works for each in work.units(event)])
         else:
             columns |= counter.values({}, [])
@@ -85,7 +85,7 @@ def _row(parts: list[tuple[Any, Any, Timing]], warp: int, counters: Mapping[str,
         "warps": sum(launch.grid * -(-launch.block // warp) for _, launch in simt),
         "instructions": round(instructions),
         "simd_efficiency": machine[MachineEvent.LANES] / (warp * instructions) if instructions else np.nan,
-        **_declared([work for work, _, _ in parts], counters),
+        **declared_columns([work for work, _, _ in parts], counters),
         **_machine(machine),
         "dram_bytes": sum(round(timing.dram_bytes) for _, _, timing in parts),
         "occupancy": longest.occupancy,

@@ -12,7 +12,7 @@ from tilestamp.models.counters import by_name, count, counters_of, distribution,
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.stage_table import _declared, declared
+from tilestamp.simulator.stage_table import declared, declared_columns
 from tilestamp.simulator.work import Work
 
 
@@ -110,7 +110,7 @@ def test_two_stages_may_mean_different_events_by_one_name():
 
     works = [luck([1, 10, 2, 64]), luck([7], events=OtherEvent, stage="other")]
     assert declared(works)["tries"].title == "tries"
-    assert [_declared([work], declared(works))["tries"] for work in works] == [10, 7]
+    assert [declared_columns([work], declared(works))["tries"] for work in works] == [10, 7]
 
 
 def test_the_launches_of_a_stage_are_one_distribution():
@@ -123,7 +123,7 @@ def test_a_ratio_of_nothing_is_no_number():
     assert np.isnan(ratio("luck", "HITS", "TRIES", "").values({"HITS": 0, "TRIES": 0}, [])["luck"])
 
 
-def test_a_counter_of_an_event_that_is_not_counted_cannot_be_declared():
+def test_a_counter_of_an_event_that_is_not_counted_cannot_bedeclared_columns():
     with pytest.raises(KeyError, match="GHOSTS"):
         shown(count("GHOSTS", "ghosts"))(SilentEvent)
 

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+from tilestamp.models.price import Fidelity
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import scene_or_stand_in
 from tilestamp.simulator.scenes.scene import Scene
@@ -32,6 +33,7 @@ def frame(
     box_tests: bool = True,
     edges: str = "computed",
     hybrid: bool = False,
+    fidelity: Fidelity = "schedule",
 ) -> Run:
     """One frame of the paper; ``pixel_extent`` is the reading of its bound that fits its counts (``scenes.views``)."""
     scene = model(name)
@@ -49,6 +51,7 @@ def frame(
         box_tests=box_tests,
         edges=edges,
         hybrid=hybrid,
+        fidelity=fidelity,
     )
 
 

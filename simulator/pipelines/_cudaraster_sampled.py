@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ from tilestamp.simulator.stages.laine2011.sampled_tiles import tile_areas
 from tilestamp.simulator.stages.laine2011.triangle_setup import BLOCK, MAX_SUBTRIANGLES, triangle_setup
 from tilestamp.simulator.work import Work
 
-if TYPE_CHECKING:
-    from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions
-
 
 def sampled_draw(
     sample: Sampler,
@@ -38,7 +35,7 @@ def sampled_draw(
     width: int,
     height: int,
     simt: Simt,
-    options: "CudarasterOptions",
+    options: Any,
 ) -> Frame:
     """One draw: all triangles set up, binned and listed; counted in part of the blocks, and drawn in part of the tiles.
 
