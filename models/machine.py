@@ -59,6 +59,8 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             bank_lanes=self.memory.bank_lanes,
             atomic_merge=int(AtomicMerge[self.atomics.merge.upper()]),
             sms=self.sm.count,
+            bank_bytes=self.memory.bank_bytes,
+            bank_mode_bytes=self.memory.bank_mode_bytes,
         )
 
     @property
@@ -211,6 +213,9 @@ def _check_sense(machine: Machine, file: str) -> None:
             memory.bank_lanes > sm.warp_size
         ),
         "warp_size may be at most 64": sm.warp_size > 64,
+        f"words of {memory.bank_mode_bytes} bytes do not fit banks of {memory.bank_bytes}": (
+            memory.bank_mode_bytes > memory.bank_bytes
+        ),
         "an L2 without l2_bytes_per_clock or latency.l2_cycles": (
             memory.l2_bytes > 0 and (memory.l2_bytes_per_clock == 0 or machine.latency.l2_cycles == 0)
         ),

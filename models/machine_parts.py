@@ -95,6 +95,8 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     banks: Count
     bank_lanes: Count
     bank_pass_cycles: Positive  # one pass of one group of bank_lanes
+    bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
+    bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
 

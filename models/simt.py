@@ -28,3 +28,5 @@ class Simt(NamedTuple):
     bank_lanes: int = 32  # lanes that access shared memory together: a half-warp (16) on 1.x
     atomic_merge: int = AtomicMerge.SECTOR
     sms: int = 132  # persistent kernels launch this many blocks
+    bank_bytes: int = 4  # that a bank of shared memory serves a pass: 8 on 3.x
+    bank_mode_bytes: int = 4  # consecutive words of this size lie in consecutive banks: 4 or 8 on 3.x
