@@ -37,6 +37,9 @@ class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shared_bytes: Size
     shared_unit_bytes: Count
     reserved_shared_bytes: Size  # that the system takes from every block
+    registers_per_block: Size = 0  # that one block may have; 0: all of the SM's
+    shared_bytes_per_block: Size = 0  # that one block may ask for; 0: all of the SM's but those reserved
+    block_warp_granularity: Size = 0  # to which a block's warps are rounded against registers_per_block; 0: as the SM's
 
 
 class Issue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
