@@ -227,5 +227,8 @@ def _check_sense(machine: Machine, file: str) -> None:
 
 
 def _nearest(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=1)
+    def distance(other: str) -> tuple[float, bool]:  # of two as near, the one that begins alike: gtx280 for gtx290
+        return -difflib.SequenceMatcher(None, other, word).ratio(), other[:4] != word[:4]
+
+    near = sorted(difflib.get_close_matches(word, known), key=distance)
     return f" (did you mean {near[0]!r}?)" if near else ""
