@@ -9,7 +9,7 @@ class Coalescing(IntEnum):
 
     HALF_WARP_SEGMENTS = 1  # compute capability 1.2, 1.3: half-warps, 128-byte segments that shrink to 64 and 32 bytes
     WARP_LINES = 2  # 2.x, 3.x: 128-byte lines through L1
-    WARP_SECTORS = 3  # 7.x and later: 32-byte sectors of 128-byte lines
+    WARP_SECTORS = 3  # 5.x and later: 32-byte sectors of 128-byte lines
 
 
 class AtomicMerge(IntEnum):

@@ -5,7 +5,7 @@ import pytest
 
 from tests import naive_banks
 from tilestamp.models.banks import atomic_passes, bank_passes
-from tilestamp.models.machine import load_machine
+from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.simt import Simt
 
 
@@ -115,6 +115,16 @@ def test_atomics_on_words_of_their_own_banks_take_one_pass():
 def test_atomics_of_half_a_warp_go_together_on_1x():
     assert atomic_passes(warp(16), 20, GT200) == 20
     assert atomic_passes(warp(1), 32, GT200) == 2
+
+
+def test_atomics_on_neighbouring_words_meet_in_a_bank_in_8_byte_mode():
+    assert atomic_passes(halves(0, 1), 32, KEPLER) == 16
+    assert atomic_passes(halves(0, 1), 32, KEPLER_8) == 32
+
+
+def test_a_what_if_sets_the_mode():
+    changed = altered(load_machine("gtx680"), {"memory.bank_mode_bytes": 8}, "assumed", "cudaDeviceSetSharedMemConfig")
+    assert changed.simt.bank_mode_bytes == 8
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from tilestamp.simulator.scenes import LookAt, load_scene
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, snap_works
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)
 VIEW = LookAt((1.0, -5.0, 2.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 40.0, 0.1, 50.0)
@@ -175,6 +176,13 @@ def test_a_warp_loads_the_sectors_that_it_touches_once():
 def test_two_half_warps_share_the_sectors_of_one_patch(patches, sectors):
     work = dice_work(np.array(patches, np.int32), 8, False, Simt())
     assert work.total(DiceEvent.LOAD_TRANSACTIONS) == sectors
+
+
+def test_snapping_dices_again_the_sub_patches_that_it_touches():
+    patch = np.array([0, 1, 1, 2, 2, 2, 3], np.int32)
+    touched = np.array([0, 1, 0, 1, 0, 1, 0], np.bool_)
+    again = snap_works(Snapped(None, touched, np.ones(7, np.int64)), patch, 4, Simt())[1]
+    assert again.total(DiceEvent.LOAD_TRANSACTIONS) == (16 + 1) + (8 + 1)  # 1 and 2 in a warp, then 2 alone
 
 
 @pytest.mark.parametrize("simt", [GTX280, Simt(coalescing=Coalescing.WARP_LINES)])
