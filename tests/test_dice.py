@@ -178,6 +178,13 @@ def test_two_half_warps_share_the_sectors_of_one_patch(patches, sectors):
     assert work.total(DiceEvent.LOAD_TRANSACTIONS) == sectors
 
 
+@pytest.mark.parametrize(("together", "sectors"), [(1, 136_000), (2, 72_000), (3, 93_336)])
+def test_loads_are_those_that_an_h200_counts(together, sectors):
+    """Read by ncu on an H200: 16,000 sub-patches, so many of one patch in a row; queue entry and control points."""
+    work = dice_work((np.arange(16_000) // together).astype(np.int32), 16_000, False, Simt())
+    assert work.total(DiceEvent.LOAD_TRANSACTIONS) == sectors
+
+
 def test_snapping_dices_again_the_sub_patches_that_it_touches():
     patch = np.array([0, 1, 1, 2, 2, 2, 3], np.int32)
     touched = np.array([0, 1, 0, 1, 0, 1, 0], np.bool_)
