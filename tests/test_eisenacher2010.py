@@ -74,7 +74,7 @@ def test_table_1_predicts_every_bucket_write():
 
 
 def test_table_1_leaves_out_the_tile_raster_that_a_gtx_280_cannot_launch():
-    run = table1.bucketing(tiny(tile=32))
+    run = table1.bucketing(tiny(tile=32, fidelity="counts"))
     assert "tile_raster" not in run.stages.index
     assert run.milliseconds > 0
 

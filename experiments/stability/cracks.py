@@ -132,9 +132,9 @@ def _row(bound: float, cure: Cure) -> dict[str, float | str]:
     works += [work for seed in SEEDS for work in frame(bound, seed, cure).works]
     extra = lookups = 0  # sub-patches that are diced again, for the ends of the lines
     if cure == "snapped edges":
-        for seed in SEEDS:
+        for seed, front in zip(SEEDS, fronts, strict=True):
             snap = snapped(bound, seed)
-            works += snap_works(snap, CELLS**2, simt_of(MACHINE))
+            works += snap_works(snap, front.subpatches.patch, CELLS**2, simt_of(MACHINE))
             extra += int(snap.touched.sum())
             lookups += int(snap.lookups.sum())
     return {

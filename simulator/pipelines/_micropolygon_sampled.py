@@ -90,7 +90,7 @@ def sampled_back_end(
     shape = block_shape(
         tiles.size, raster["spp"], simt, box_tests=raster["box_tests"], loaded=raster["edges"] == "loaded"
     )
-    diced = dice_work(len(boxes), len(points), textured, simt)
+    diced = dice_work(subpatches.patch, len(points), textured, simt)
     counted, written = _buckets(sample, split, tiles, sizes, count, start)
     rastered = sample.stage(
         sizes.boxes,

@@ -138,7 +138,7 @@ def micropolygon(
         snapped = snapping.snap_edges(subpatches, grids, snapping.shared_edges(points))
         grids = snapped.grids
         if counting:
-            diced += snapping.snap_works(snapped, len(points), simt, textured=texture is not None)
+            diced += snapping.snap_works(snapped, subpatches.patch, len(points), simt, textured=texture is not None)
     if options.hybrid:
         drawn_grids = draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
         return replace(drawn_grids, warnings=remarks(REMARKS, drawn_grids.facts))

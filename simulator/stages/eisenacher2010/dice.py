@@ -213,4 +213,4 @@ def dice(
         colors,
         grids.boxes,
     )
-    return grids, [dice_work(number, len(points), texture is not None, simt)] if counting else []
+    return grids, [dice_work(subpatches.patch, len(points), texture is not None, simt)] if counting else []

@@ -96,12 +96,16 @@ def snap_edges(subpatches: SubPatches, grids: Grids, shared: NDArray[np.int64]) 
     return Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
 
 
-def snap_works(snapped: Snapped, patches: int, simt: Simt, *, textured: bool = False) -> list[Work]:
+def snap_works(
+    snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, *, textured: bool = False
+) -> list[Work]:
     """Works of snapping: the look-ups, and dicing the sub-patches concerned again; none where all are of one depth.
 
     Parameters
     ----------
     snapped : Snapped
+    patch : ndarray, (N,), int32
+        UrPatch of each sub-patch.
     patches : int
         UrPatches of the scene.
     simt : Simt
@@ -112,7 +116,7 @@ def snap_works(snapped: Snapped, patches: int, simt: Simt, *, textured: bool = F
     starts = np.arange(0, len(snapped.touched), BLOCK)
     counts = np.stack([snapped.lookups, snapped.touched], axis=1).astype(np.int64)
     table = np.add.reduceat(counts, starts, axis=0)
-    again = dice_work(int(snapped.touched.sum()), patches, textured, simt)
+    again = dice_work(patch[snapped.touched], patches, textured, simt)
     return [
         Work(stage="snap_edges", kernel="snap_edges", events=SnapEvent, table=table, grid=len(starts), block=BLOCK),
         replace(again, stage="snap_edges"),
