@@ -59,7 +59,8 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Drop triangles that face away; none: as published, on in 1.1, off in nvdiffrast."""
     guard_band: bool | None = None
     """Leave triangles whole that leave the screen by less than 2048 pixels; none: on in 1.1, off in nvdiffrast, whose
-    copies differ: some have it on."""
+    copies differ: some have it on. As in the original, a clipped triangle beside a whole one then leaves holes along
+    their edge (experiment stability/guard_band)."""
     batches: Annotated[int, Meta(ge=1, le=1024)] = 1
     """Draws that the triangles are divided among; the first clears."""
     copy_parameters: bool = False

@@ -23,8 +23,8 @@ from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitiv
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
-    cull_backfaces: bool = False
-    """Leave out triangles that face away; the original's basic path does not."""
+    cull_backfaces: bool = True
+    """Leave out triangles that face away, as both published versions do."""
     race: bool = True
     """Show what the unprotected writes leave (by the model of ``per_primitive_raster``); false: what was meant."""
     perspective: bool = True
@@ -32,7 +32,7 @@ class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
     ssao: bool = False
-    """Screen-space ambient occlusion."""
+    """Screen-space ambient occlusion, and its blur."""
 
 
 def per_primitive(
@@ -64,8 +64,8 @@ def per_primitive(
     light = np.ones((height, width), np.float32)
     if options.ssao:
         light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
-        works.append(occlusion)
-    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
+        works += occlusion
+    waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(
         mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     )

@@ -35,7 +35,7 @@ class TiledOptions(Options, frozen=True, kw_only=True):
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
     ssao: bool = False
-    """Screen-space ambient occlusion."""
+    """Screen-space ambient occlusion, and its blur."""
 
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """Tiled raster has a thread a pixel of a tile."""
@@ -76,8 +76,8 @@ def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Sim
     light = np.ones((height, width), np.float32)
     if options.ssao:
         light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
-        works.append(occlusion)
-    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
+        works += occlusion
+    waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(
         mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     )

@@ -1,8 +1,9 @@
 """Screen-space ambient occlusion (Ru 2016, "SSAO"): 64 samples, 4x4 noise, linear depth.
 
 Samples of the upper hemisphere are turned about its axis by the noise of the pixel, lifted to the eye-space normal,
-and projected; a sample is occluded if the pixel there is before it. "Need to use linear depth." The cost is that of
-the screen: it does not depend on the scene. The sample pattern, the radius and the range check are ours: he names none.
+and projected; a sample is occluded if the pixel there is before it. "Need to use linear depth." A second kernel blurs
+(``occlusion_blur``). The cost is that of the screen: it does not depend on the scene. The sample pattern, the radius and
+the range check are ours: he names none.
 """
 
 from typing import Any
@@ -16,6 +17,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
+from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
 from tilestamp.simulator.stages.ru2016.vertex_shading import EyeSpace
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.work import Work
@@ -95,7 +97,7 @@ def _ambient_occlusion(
         _row(w, normals, turns, samples, scales, relative, y, light)
 
 
-def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[NDArray[np.float32], Work]:
+def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[NDArray[np.float32], list[Work]]:
     """Find how much light reaches each pixel.
 
     Parameters
@@ -107,8 +109,9 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[
     Returns
     -------
     light : ndarray, (H, W), float32
-        1 where nothing occludes.
-    work : Work
+        1 where nothing occludes; blurred.
+    works : list of Work
+        The occlusion and the blur.
 
     Raises
     ------
@@ -124,4 +127,6 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[
     )  # fmt: skip
     loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
     stores = (Access("occlusion", 4, 1),)
-    return light, thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    occlusion = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    light, blur = occlusion_blur(light, simt)
+    return light, [occlusion, blur]
