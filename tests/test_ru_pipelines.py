@@ -69,6 +69,28 @@ def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipelin
     assert frame.depth[drawn] == pytest.approx(depth[drawn], abs=1e-5)
 
 
+@pytest.mark.parametrize(("pipeline", "options"), [(tiled, {}), (per_primitive, {"race": False})])
+def test_samples_at_corners_are_those_of_a_picture_half_a_pixel_on(scene, matrix, pipeline, options):
+    """y points up in the original: the sample is the lower left corner of its pixel."""
+    frame = draw(scene, matrix, pipeline, samples="corners", **options)
+    moved = np.array([0.5, -0.5, 0.0, 0.0])
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT) + moved
+    ids, _, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT)
+    sure = doubt > NEAR_EDGE
+    assert (frame.triangle_ids[sure] == ids[sure]).all()
+    assert (frame.triangle_ids[sure] != draw(scene, matrix, pipeline, **options).triangle_ids[sure]).any()
+
+
+@pytest.mark.parametrize("name", ["Duck_fit", "CesiumMilkTruck_near"])
+def test_with_samples_at_corners_lists_and_pixels_are_the_originals_on_a_gpu(shared, name):
+    given, gpu = (np.load(shared / f"silicon/textured/{part}/ru_{name}.npz") for part in ("inputs", "measured/ids"))
+    corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
+    made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
+    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}))
+    assert (frame.maps["list length"][::-1].ravel() == gpu["t8c_cnt"].ravel()).all()
+    assert np.count_nonzero(frame.triangle_ids[::-1].ravel() != gpu["t8c_id"].ravel()) <= 1  # equal depths
+
+
 def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
     mesh = geometry(scene)
     vertices, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
@@ -251,7 +273,7 @@ def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
 
 
 def test_the_blur_loads_and_stores_as_often_as_an_h200_counts():
-    """Measured on the original at 800x800: 16 sectors a store of 4 warps, one of each loading thread, 5 warps a block."""
+    """Measured on the original at 800x800: a sector for each thread that loads, and for each that stores."""
     counts = occlusion_blur(np.ones((800, 800), np.float32), Simt())[1].counts()
     assert counts["STORE_TRANSACTIONS"] == 640_000
     assert counts["LOAD_TRANSACTIONS"] == pytest.approx(1_429_963, rel=0.01)

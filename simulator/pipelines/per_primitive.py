@@ -17,7 +17,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, primitive_assembly, vertex_shading
 
 
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
@@ -31,6 +31,8 @@ class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Perspective-correct interpolation."""
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
+    samples: Samples = "centers"
+    """Where in its pixel a sample lies: at its centre, or at its lower left corner, as in the original."""
     ssao: bool = False
     """Screen-space ambient occlusion, and its blur."""
 
@@ -48,13 +50,13 @@ def per_primitive(
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts, samples=options.samples)
     drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
     works = [work for part in zip(shading, assembly, strict=True) for work in part]
     works += clear(width, height, 0, simt)
     meant, raced, raster = per_primitive_raster(
         vertices.screen, mesh.triangles, drawable, width, height, simt, culling=options.cull_backfaces,
-        textured=bool((mesh.texture_ids >= 0).any()),
+        textured=bool((mesh.texture_ids >= 0).any()), samples=options.samples,
     )  # fmt: skip
     works.append(raster)
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
@@ -63,7 +65,7 @@ def per_primitive(
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
+        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt, samples=options.samples)
         works += occlusion
     waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(

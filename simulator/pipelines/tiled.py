@@ -17,7 +17,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
 from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, raster_work, tiled_raster
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, primitive_assembly, vertex_shading
 from tilestamp.simulator.work import Work
 
 
@@ -34,6 +34,8 @@ class TiledOptions(Options, frozen=True, kw_only=True):
     """Perspective-correct interpolation."""
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
+    samples: Samples = "centers"
+    """Where in its pixel a sample lies: at its centre, or at its lower left corner, as in the original."""
     ssao: bool = False
     """Screen-space ambient occlusion, and its blur."""
 
@@ -55,7 +57,7 @@ def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Sim
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
+    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts, samples=options.samples)
     drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
     works = [work for part in zip(shading, assembly, strict=True) for work in part]
     works += clear(width, height, tiles, simt)
@@ -75,7 +77,7 @@ def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Sim
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
+        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt, samples=options.samples)
         works += occlusion
     waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image, finish = fragment_shading(

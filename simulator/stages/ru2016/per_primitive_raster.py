@@ -24,6 +24,7 @@ from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FA
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
 from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
+from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, Samples
 from tilestamp.simulator.work import Work
 
 START_LOADS = 9  # x, y and z of three vertices
@@ -59,6 +60,7 @@ def per_primitive_raster(
     *,
     culling: bool,
     textured: bool = False,
+    samples: Samples = "centers",
 ) -> tuple[Visible, Race, Work]:
     """Draw triangle by triangle.
 
@@ -73,6 +75,8 @@ def per_primitive_raster(
     culling : bool
     textured : bool
         Whether fragments carry texture coordinates.
+    samples : {"centers", "corners"}
+        Where in its pixel a sample lies (``vertex_shading``).
 
     Returns
     -------
@@ -91,7 +95,7 @@ def per_primitive_raster(
     requests = np.zeros(width * height // 8 + 1, np.int64)
     resident = simt.sms * (THREADS_AN_SM // simt.warp)
     walk(
-        (screen, triangles, drawable),
+        (screen, triangles, drawable, SHIFTS[samples]),
         culling,
         int(simt.atomic_merge),
         walkers(resident, simt.warp),
