@@ -71,7 +71,7 @@ def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipelin
 
 @pytest.mark.parametrize(("pipeline", "options"), [(tiled, {}), (per_primitive, {"race": False})])
 def test_samples_at_corners_are_those_of_a_picture_half_a_pixel_on(scene, matrix, pipeline, options):
-    """y points up in the original: the sample is the lower left corner of its pixel."""
+    """Up is y in the original: the sample is the lower left corner of its pixel."""
     frame = draw(scene, matrix, pipeline, samples="corners", **options)
     moved = np.array([0.5, -0.5, 0.0, 0.0])
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT) + moved

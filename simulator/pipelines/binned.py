@@ -10,7 +10,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.scenes.texture import TILE, texture_chains
+from tilestamp.simulator.scenes.texture import MAX_LEVELS, TILE, texture_chains
 from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
@@ -44,6 +44,8 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """How texels are stored."""
     texture_tile: Literal[2, 4, 8, 16] = TILE
     """Texels on a side of a storage tile."""
+    texture_levels: Annotated[int, Meta(ge=0, le=MAX_LEVELS)] = 0
+    """Levels of a texture for trilinear filtering; 0 for all. The original's current state: rows, 4 levels."""
     cull_backfaces: bool = True
     """Cull triangles that face away."""
     fragments_a_pixel: Annotated[int, Meta(ge=0, le=65536)] = KEPT
@@ -55,6 +57,8 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """Multiplies every alpha."""
     optimized: bool = True
     """The kernels after the optimizations that the source lists, or before."""
+    original_faults: bool = False
+    """As the original, leave out the rows beyond whole blocks of 32 (the top 24 of 1080), and a frame's fragment 0."""
 
 
 def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BinnedOptions) -> Frame:
@@ -69,7 +73,9 @@ def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Si
     mesh = geometry(scene)
     textures = scene.mesh.textures if scene.mesh else ()
     stored = options.texture_tile if options.texture_layout == "tiled" else 0
-    chains = texture_chains(textures, tile=stored, mips=options.texture_filter == "trilinear")
+    chains = texture_chains(
+        textures, tile=stored, mips=options.texture_filter == "trilinear", levels=options.texture_levels
+    )
     opaque = options.order == "api"
 
     vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
@@ -78,14 +84,16 @@ def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Si
     data, setup = triangle_setup(primitives, simt, triangles=len(mesh.triangles))
     bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))
     tiles, coarse = coarse_rasterizer(data, bins, width, height, simt, hi_z=opaque, unrolled=optimized)
-    fragments, fine = fine_rasterizer(data, tiles, width, height, simt, early_z=opaque, optimized=optimized)
+    fragments, fine = fine_rasterizer(
+        data, tiles, width, height, simt, early_z=opaque, optimized=optimized, whole_blocks=options.original_faults
+    )
     stream, shader = pixel_shader(
         data, tiles, fragments, chains, mesh.texture_ids, simt,
         texture_filter=options.texture_filter, opacity=options.opacity, optimized=optimized,
     )  # fmt: skip
     target, depth, winners, resolve = rop(
         data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
-        limit=options.fragments_a_pixel, optimized=optimized,
+        limit=options.fragments_a_pixel, optimized=optimized, zero_ends=options.original_faults,
     )  # fmt: skip
     image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
 
