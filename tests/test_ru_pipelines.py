@@ -91,6 +91,19 @@ def test_with_samples_at_corners_lists_and_pixels_are_the_originals_on_a_gpu(sha
     assert np.count_nonzero(frame.triangle_ids[::-1].ravel() != gpu["t8c_id"].ravel()) <= 1  # equal depths
 
 
+@pytest.mark.parametrize("name", ["Duck_fit", "CesiumMilkTruck_near"])
+def test_per_primitive_tests_as_many_pixels_as_the_original_does(shared, name):
+    """The near view has triangles beside the screen: they walk its border."""
+    given = np.load(shared / f"silicon/textured/inputs/ru_{name}.npz")
+    corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
+    made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
+    options = pipeline_options("per-primitive", {"samples": "corners"})
+    counts = work(per_primitive(made, given["matrix"], 800, 800, SIMT, options), "per_primitive_raster").counts()
+    counted = (shared / f"silicon/textured/source_on_cpu/ru_{name}.csv").read_text().splitlines()
+    for event in ("sample_tests", "sample_hits"):
+        assert f"per_primitive_cull,_rasterize,{event},{counts[event.upper()]}" in counted
+
+
 def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
     mesh = geometry(scene)
     vertices, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)

@@ -5,6 +5,9 @@ readings of it are hypotheses. His library takes angles in radians, so that 45 o
 (tan 22.5 = 0.558); `models` shows what 45 degrees would give. And his table of models was made with 16x16 tiles: one
 version of his source has them, and the engine takes 38 ms in it as in his table of tile sizes at 16.
 
+His per-primitive path culls backfaces in both published versions, and so does ours here; samples are ours, at the
+centres of pixels, where his lie at integer coordinates (``samples="corners"``).
+
 Box and triangle are ours: the glTF samples of those names are a unit cube and one triangle. The course's glTF cow is
 the OBJ one scaled down to 0.97 units. Engine (740 units) and di (107) do not fit his view; how he scaled them is not
 known: their size on the screen is chosen on their per-primitive times. Models that are not on the scene path are left

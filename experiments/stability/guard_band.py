@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SIZE = 64  # pixels
 SUBPIXELS = 16
-EDGES = 48  # shared edges, within 20 degrees of the vertical
+EDGES = 16  # shared edges, within 20 degrees of the vertical
 HALF_EDGE, SMALL, FAR = 150.0, 200.0, 500.0  # pixels: half an edge, the small triangle, the one before the near plane
 VIEWS = 160  # from inside a closed box
 COST_SIZE, COST_CUTS, COST_VIEWS = 512, 32, 10

@@ -8,7 +8,7 @@ from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent
-from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, border_box, corners, inside
 
 RACE_ROUNDS = 3  # assumed
 DEPTH_SCALE = np.float64(2**31 - 1)  # depths are compared as integers
@@ -122,11 +122,9 @@ def _boxes(
             if row is not None:
                 row[PerPrimitiveEvent.CULLED] += 1
             continue
-        left, right, top, bottom = pixel_box(
+        left, right, top, bottom = border_box(
             x0 - shift[0], y0 - shift[1], x1 - shift[0], y1 - shift[1], x2 - shift[0], y2 - shift[1], shape[1], shape[0]
         )
-        if left > right or top > bottom:
-            continue
         boxes[lane, 0] = left
         boxes[lane, 1] = right - left + 1
         boxes[lane, 2] = top
