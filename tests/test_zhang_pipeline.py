@@ -136,6 +136,18 @@ def test_with_the_originals_faults_the_rows_beyond_whole_blocks_and_one_fragment
     assert missing[-1, 0]  # the first quad of the first tile
 
 
+def test_fragment_0_is_lost_below_another_one_too(matrix):
+    """Two walls by order-independent transparency: fragment 0 ends the list of the lower left pixel."""
+    corners = [(x, y, z, 1) for z in (0, 1) for x, y in ((-9, -9), (9, -9), (0, 14))]
+    mesh = Mesh(np.array(corners, np.float32), np.arange(6, dtype=np.int32).reshape(2, 3))
+    whole, lossy = (
+        draw(Scene("walls", mesh=mesh), matrix, order="oit", opacity=0.5, original_faults=faults).image[3:].astype(int)
+        for faults in (False, True)
+    )
+    assert [tuple(place) for place in np.argwhere((whole != lossy).any(axis=2))] == [(HEIGHT - 4, 0)]
+    assert (lossy[-1, 0] > 0).all()  # the other wall
+
+
 def test_at_1080_the_top_24_rows_stay_empty_as_on_a_gpu(shared):
     name = "zh_bunny_5k_near.npz"
     given, gpu = (np.load(shared / f"silicon/textured/{part}/{name}") for part in ("inputs", "measured/ids"))
