@@ -81,7 +81,14 @@ def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> tuple[NDArray[np.f
         Stream("fragments", "store", SECTOR_BYTES * stored, footprint),
     )
     work = Work(
-        "occlusion_blur", "occlusion_blur", OcclusionBlurEvent, table, blocks, BLOCK, SHARED_BYTES, streams=streams
+        stage="occlusion_blur",
+        kernel="occlusion_blur",
+        events=OcclusionBlurEvent,
+        table=table,
+        grid=blocks,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=streams,
     )
     return out, work
 
