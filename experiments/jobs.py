@@ -1,33 +1,30 @@
-"""Experiments side by side: those of one folder in one process, for they share frames and kernels.
+"""Experiments side by side, in processes of joblib's.
 
 Compiling kernels holds one core, so that two processes make the first run on two cores almost twice as fast.
 """
 
-import multiprocessing
 import os
 import shutil
 import signal
-import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+import socket
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from itertools import groupby
+from functools import partial
+from itertools import chain, groupby
+from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from threading import Thread
+from typing import Any
 
-from tilestamp.experiments.registry import load_experiment
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.registry import Progress, describe, load_experiment, process_of
+from tilestamp.experiments.result import Outcome, Result
 from tilestamp.experiments.write import SCRATCH, write_result
-from tilestamp.models.errors import TilestampError
+from tilestamp.models.errors import MissingInputError, TilestampError
 
-if TYPE_CHECKING:
-    from multiprocessing.queues import SimpleQueue
-
-Say = Callable[[str], None]
-POLL_SECONDS = 0.2
-END_SECONDS = 5.0  # that a process has to end once it is told to
-_progress: "SimpleQueue[str] | None" = None  # of a worker process: to whom it says what it does
+LONGEST = 4096  # bytes of one line of progress
 
 
 def default_jobs() -> int:
@@ -35,7 +32,9 @@ def default_jobs() -> int:
     return min(2, os.cpu_count() or 1)
 
 
-def run_experiments(names: Sequence[str], output: Path, options: dict[str, Any], say: Say, jobs: int) -> list[Result]:
+def run_experiments(
+    names: Sequence[str], output: Path, options: dict[str, Any], say: Progress, jobs: int
+) -> Iterator[Outcome]:
     """Run experiments and write their results.
 
     Parameters
@@ -46,91 +45,89 @@ def run_experiments(names: Sequence[str], output: Path, options: dict[str, Any],
     options : dict
         For the manifests.
     say : callable
-        Told what is being done.
+        Told what is being done, from another thread.
     jobs : int
         Processes; 1 runs everything in this one.
 
-    Returns
-    -------
-    list of Result
-        In the order of ``names``; from other processes without the functions that draw, for all is drawn.
-
-    Raises
+    Yields
     ------
-    TilestampError
-        Of an experiment; or where a process ended before its time.
+    Outcome
+        As they come; results without their figures' functions, for all is drawn.
     """
-    folders = [list(group) for _, group in groupby(names, key=lambda name: name.split("/")[0])]
-    if jobs == 1 or len(folders) == 1:
-        return [_run(name, output, options, say) for name in names]
-    context = multiprocessing.get_context("spawn")  # threads and compiled code do not survive a fork
-    progress: SimpleQueue[str] = context.SimpleQueue()
-    pool = ProcessPoolExecutor(min(jobs, len(folders)), context, _start, (progress,))
+    from joblib import Parallel, delayed
+    from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    groups = [list(group) for _, group in groupby(names, key=(lambda name: name) if jobs == 1 else process_of)]
+    left = dict.fromkeys(names)
     try:
-        futures = [pool.submit(_run_folder, group, output, options) for group in folders]
-        _watch(futures, progress, say)
-        return [result for future in futures for result in future.result()]
-    except BaseException as error:
-        _end_workers(output)
-        if isinstance(error, BrokenProcessPool):
-            sentence = "a process that ran experiments ended before its time: out of memory? try -j 1"
-            raise TilestampError(sentence) from error
-        raise
+        with _listener(say) as address:
+            tasks = [delayed(_run_all)(group, output, options, address) for group in groups]
+            resource_tracker.ensure_running()  # or joblib starts it in what follows, and it lets signals through
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers do not hear Ctrl-C: we end them
+            try:
+                finished = Parallel(jobs, return_as="generator_unordered")(tasks)
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            for outcome in chain.from_iterable(finished):
+                del left[outcome.name]
+                yield outcome
+    except TerminatedWorkerError:
+        sentence = "a process that ran experiments ended before its time: out of memory? try -j 1"
+        yield from (Outcome(name, failure=sentence) for name in left)
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+        for scratch in output.glob(f"{SCRATCH}*"):
+            shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _run(name: str, output: Path, options: dict[str, Any], say: Say) -> Result:
-    say(name)
-    result = load_experiment(name)(say)
-    write_result(result, output, options)
-    return result
+def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], address: str) -> list[Outcome]:
+    """Run some experiments one after another, perhaps in a process of their own."""
+    return [_run(name, output, options, partial(_send, address)) for name in names]
 
 
-def _run_folder(names: Sequence[str], output: Path, options: dict[str, Any]) -> list[Result]:
-    """In a worker: some experiments one after another; what draws stays here."""
-    assert _progress is not None  # noqa: S101 - set when the worker started
-    results = [_run(name, output, options, _progress.put) for name in names]
-    return [replace(r, figures=[Figure(f.name, _drawn) for f in r.figures]) for r in results]
+def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Outcome:
+    """Run one experiment; what it lacks is said in its place."""
+    try:
+        say(name)
+        try:
+            result = load_experiment(name)(say)
+        except MissingInputError as missing:
+            result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
+        write_result(result, output, options)
+    except TilestampError as error:
+        return Outcome(name, failure=str(error))
+    except Exception as error:  # noqa: BLE001 - one experiment's fault ends no other
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return Outcome(name, failure=f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+    return Outcome(name, replace(result, figures=[replace(figure, draw=_drawn) for figure in result.figures]))
 
 
 def _drawn(_path: Path) -> None:
-    """Stand for a figure that another process has drawn."""
+    """Stand for a figure that has been drawn."""
 
 
-def _start(progress: "SimpleQueue[str]") -> None:
-    """Set a worker up: Ctrl-C is the parent's business, which ends its workers and removes what they leave."""
-    global _progress  # noqa: PLW0603 - a process has one
-    _progress = progress
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
+@contextmanager
+def _listener(say: Progress) -> Iterator[str]:
+    """Pass on what workers send to an address."""
+    with TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        address = f"{folder}/progress"
+        receiver.bind(address)
+        thread = Thread(target=_pass_on, args=(receiver, say), daemon=True)
+        thread.start()
+        try:
+            yield address
+        finally:
+            _send(address, "")
+            thread.join()
 
 
-def _leave_with_parent() -> None:
-    """End when the parent is gone, however it went."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _pass_on(receiver: socket.socket, say: Progress) -> None:
+    while line := receiver.recv(LONGEST):
+        say(line.decode())
 
 
-def _watch(futures: list[Future[list[Result]]], progress: "SimpleQueue[str]", say: Say) -> None:
-    """Pass on what workers say until all are done or one fails."""
-    waiting = True
-    while waiting:
-        done, left = wait(futures, timeout=POLL_SECONDS)
-        waiting = bool(left) and not any(future.exception() for future in done)
-        while not progress.empty():
-            say(progress.get())
-
-
-def _end_workers(output: Path) -> None:
-    """Stop the workers and remove what they had half-written."""
-    children = multiprocessing.active_children()
-    for child in children:
-        child.terminate()
-    for child in children:
-        child.join(END_SECONDS)
-        child.kill()
-    for scratch in output.glob(f"{SCRATCH}*"):
-        shutil.rmtree(scratch, ignore_errors=True)
+def _send(address: str, text: str) -> None:
+    """Say what is being done; an OSError where nobody listens any more."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.sendto(text.encode()[:LONGEST], address)

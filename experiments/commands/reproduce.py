@@ -10,11 +10,12 @@ from cyclopts import Parameter
 from tilestamp.experiments.commands.terminal import print_table, progress
 from tilestamp.experiments.jobs import default_jobs, run_experiments
 from tilestamp.experiments.registry import experiment_names, select
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.result import Outcome, Result
 from tilestamp.experiments.write import COLUMNS, cell_texts, write_index
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
+FAILED = 1  # exit code where an experiment gave no result
 
 
 def reproduce(
@@ -23,7 +24,7 @@ def reproduce(
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     jobs: Annotated[int | None, Parameter(name=["--jobs", "-j"])] = None,
-) -> None:
+) -> int:
     """Print published tables beside what the model computes, cell by cell, and write CSV, manifests, plots and a page.
 
     Parameters
@@ -42,16 +43,23 @@ def reproduce(
     chosen = select(names, everything=all_)
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
+    outcomes: dict[str, Outcome] = {}
     with progress(f"reproducing {len(chosen)} experiments") as say:
-        results = run_experiments(chosen, output, {"names": list(names)}, say, jobs or default_jobs())
+        for outcome in run_experiments(chosen, output, {"names": list(names)}, say, jobs or default_jobs()):
+            outcomes[outcome.name] = outcome
+            if outcome.result is not None and not json_:
+                with say.paused():
+                    _print_result(outcome.result)
+        results = [result for name in chosen if (result := outcomes[name].result) is not None]
         page = write_index(results, output)
     if json_:
         cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
         sys.stdout.write(json.dumps(cells) + "\n")
-        return
-    for result in results:
-        _print_result(result)
-    _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
+    else:
+        _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
+    failures = [f"tilestamp: {name} failed: {outcomes[name].failure}\n" for name in chosen if outcomes[name].failure]
+    sys.stderr.writelines(failures)
+    return FAILED if failures else 0
 
 
 def _print_end(output: Path, page: Path, left: set[str]) -> None:
@@ -66,6 +74,9 @@ def _print_result(result: Result) -> None:
     sys.stdout.write("\n")
     for warning in result.warnings:
         sys.stdout.write(f"! {warning}\n")
+    if not result.cells:
+        sys.stdout.write(f"{result.title} [{result.name}]\n")
+        return
     rows = [cell_texts(cell) for cell in result.cells]
     styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
     print_table(f"{result.title} [{result.name}]", COLUMNS, rows, styles)
