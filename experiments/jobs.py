@@ -23,6 +23,7 @@ from tilestamp.experiments.registry import Progress, describe, load_experiment, 
 from tilestamp.experiments.result import Outcome, Result
 from tilestamp.experiments.write import SCRATCH, write_result
 from tilestamp.models.errors import MissingInputError, TilestampError
+from tilestamp.models.used import collect
 
 LONGEST = 4096  # bytes of one line of progress
 
@@ -91,10 +92,11 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
     try:
         say(name)
         try:
-            result = load_experiment(name)(say)
+            with collect() as used:
+                result = load_experiment(name)(say)
         except MissingInputError as missing:
             result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
-        write_result(result, output, options)
+        write_result(result, output, options, used)
     except TilestampError as error:
         return Outcome(name, failure=str(error))
     except Exception as error:  # noqa: BLE001 - one experiment's fault ends no other

@@ -15,6 +15,7 @@ from tilestamp.models.timing import Timing
 from tilestamp.simulator import intervals
 from tilestamp.simulator.estimate import Estimate
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.manifest import Origin, note_run, run_manifest
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stage_table import interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
@@ -39,6 +40,12 @@ class Run:
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
+
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        """Note it for the manifest of whoever collects."""
+        note_run(self)
 
     @property
     def counted(self) -> bool:
@@ -166,3 +173,7 @@ class Run:
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
         machine = load_machine(machine) if isinstance(machine, str) else machine
         return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
+
+    def manifest(self) -> dict[str, Any]:
+        """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""
+        return run_manifest(self)

@@ -10,6 +10,7 @@ import numpy as np
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import FIDELITIES, Fidelity
+from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options, takes
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sampler import Sampler
@@ -78,7 +79,9 @@ def simulate(
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, options)
+    run = partial(
+        Run, scene.name, pipeline, machine, width, height, fidelity, options, origin=origin_of(scene, matrix, seed)
+    )
     draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, **options)
     note = scene.note
     without_picture = {"picture": False} if takes(pipeline, "picture") else {}

@@ -1,6 +1,7 @@
 """``tilestamp reproduce``: published tables beside ours."""
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -43,9 +44,10 @@ def reproduce(
     chosen = select(names, everything=all_)
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
+    options = {"names": list(names), "command": shlex.join(sys.argv)}
     outcomes: dict[str, Outcome] = {}
     with progress(f"reproducing {len(chosen)} experiments") as say:
-        for outcome in run_experiments(chosen, output, {"names": list(names)}, say, jobs or default_jobs()):
+        for outcome in run_experiments(chosen, output, options, say, jobs or default_jobs()):
             outcomes[outcome.name] = outcome
             if outcome.result is not None and not json_:
                 with say.paused():

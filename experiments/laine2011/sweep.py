@@ -8,7 +8,9 @@ import numpy as np
 from tilestamp.experiments.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.models.used import remembered
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.pipelines import load_pipeline
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
@@ -47,7 +49,7 @@ def areas() -> tuple[float, ...]:
     return chosen
 
 
-@cache
+@remembered
 def draw(area: float) -> tuple[Run, int]:
     """Draw one area; give the run without its picture, and its triangles."""
     machine = load_machine(MACHINE)
@@ -57,7 +59,8 @@ def draw(area: float) -> tuple[Run, int]:
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)
     options = {"mode": "color"}
-    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", options, bare)
+    origin = origin_of(scene, np.eye(4), seed=0)
+    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", options, bare, origin=origin)
     return run, len(scene.mesh.triangles)
 
 
