@@ -9,8 +9,8 @@ from multiprocessing import active_children
 import pytest
 
 from tilestamp.experiments.command_line import run_command
-from tilestamp.experiments.jobs import run_experiments
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.harness.jobs import run_experiments
+from tilestamp.experiments.harness.result import Result
 from tilestamp.models.errors import MissingInputError
 
 
@@ -18,8 +18,8 @@ from tilestamp.models.errors import MissingInputError
 def experiments(monkeypatch):
     """Run what a test puts in here instead of the package's own experiments, in this process."""
     found = {}
-    monkeypatch.setattr("tilestamp.experiments.jobs.load_experiment", found.__getitem__)
-    monkeypatch.setattr("tilestamp.experiments.jobs.describe", lambda name: f"What {name} is.")
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs.load_experiment", found.__getitem__)
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs.describe", lambda name: f"What {name} is.")
     monkeypatch.setattr("tilestamp.experiments.commands.reproduce.select", lambda *_, **__: list(found))
     return found
 
@@ -82,7 +82,7 @@ def test_an_error_in_another_process_is_an_outcome_and_leaves_no_process(tmp_pat
 
 
 def test_a_worker_that_dies_is_a_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr("tilestamp.experiments.jobs._run_all", lambda *_: os._exit(1))
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs._run_all", lambda *_: os._exit(1))
     outcomes = list(run_experiments(["ste/nowhere", "silicon/nobody"], tmp_path, {}, lambda _: None, 2))
     assert {outcome.name for outcome in outcomes} == {"silicon/nobody", "ste/nowhere"}
     assert all("ended before its time" in outcome.failure for outcome in outcomes)

@@ -9,8 +9,8 @@ import pytest
 import tilestamp
 from tilestamp import Scene, altered, load_machine, simulate
 from tilestamp.experiments.command_line import run_command
-from tilestamp.experiments.jobs import run_experiments
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.harness.jobs import run_experiments
+from tilestamp.experiments.harness.result import Result
 from tilestamp.models.machine import FOLDER
 from tilestamp.models.used import collect, remembered
 from tilestamp.simulator import mix
@@ -141,7 +141,7 @@ def draw(machine="gtx480"):
 
 def made_by(experiment, folder, monkeypatch):
     """Manifest of an experiment, without its date."""
-    monkeypatch.setattr("tilestamp.experiments.jobs.load_experiment", lambda _: experiment)
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs.load_experiment", lambda _: experiment)
     list(run_experiments(["a/x"], folder, {"command": "tilestamp reproduce"}, lambda _: None, 1))
     return json.loads((folder / "a-x" / "manifest.json").read_text()) | {"date": ""}
 

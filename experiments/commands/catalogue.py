@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.registry import describe, experiment_names, is_slow
+from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow
 from tilestamp.models.machine import list_machines
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_names
 from tilestamp.simulator.scenes import list_scenes

@@ -9,10 +9,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.terminal import print_table, progress
-from tilestamp.experiments.jobs import default_jobs, run_experiments
-from tilestamp.experiments.registry import experiment_names, select
-from tilestamp.experiments.result import Outcome, Result
-from tilestamp.experiments.write import COLUMNS, cell_texts, write_index
+from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
+from tilestamp.experiments.harness.registry import experiment_names, select
+from tilestamp.experiments.harness.result import Outcome, Result
+from tilestamp.experiments.harness.write import COLUMNS, cell_texts, write_index
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"

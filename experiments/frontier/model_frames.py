@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from tilestamp.experiments.eisenacher2010.frames import model, overhead_ms, stand_in_warnings
+from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.laine2011 import sweep
-from tilestamp.experiments.published import published
 from tilestamp.experiments.silicon.seen_scenes import SEEN
 from tilestamp.experiments.validation.back_end import cameras
 from tilestamp.experiments.validation.quantities import TIME_METRIC

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.published import published
+from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.used import remembered
 from tilestamp.simulator.run import Run

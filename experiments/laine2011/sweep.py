@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from tilestamp.experiments.published import published
+from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.used import remembered

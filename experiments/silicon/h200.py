@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.silicon.inputs import write_inputs
 from tilestamp.experiments.silicon.seen_scenes import SEEN, seen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL

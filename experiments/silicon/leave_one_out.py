@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.result import Cell, Result
-from tilestamp.experiments.silicon import cudaraster_mix, freepipe_mix
+from tilestamp.experiments.calibration import cudaraster_mix, freepipe_mix
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.silicon.h200 import SOURCE
 from tilestamp.experiments.silicon.inputs import write_inputs
 from tilestamp.experiments.silicon.seen_scenes import SEEN, seen_scenes

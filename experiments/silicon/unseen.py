@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.silicon.inputs import write_inputs
 from tilestamp.experiments.silicon.unseen_scenes import unseen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE, bunny, draw, profiled, published
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tilestamp
-from tilestamp.experiments.registry import describe_folder
-from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.harness.registry import describe_folder
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.models.used import Used
 from tilestamp.reports.page import write_page
 from tilestamp.simulator.manifest import software, source_digest, used_manifest

@@ -19,9 +19,9 @@ from tempfile import TemporaryDirectory
 from threading import Thread
 from typing import Any
 
-from tilestamp.experiments.registry import Progress, describe, load_experiment, process_of
-from tilestamp.experiments.result import Outcome, Result
-from tilestamp.experiments.write import SCRATCH, write_result
+from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
+from tilestamp.experiments.harness.result import Outcome, Result
+from tilestamp.experiments.harness.write import SCRATCH, write_result
 from tilestamp.models.errors import MissingInputError, TilestampError
 from tilestamp.models.used import collect
 

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.harness.result import Result
 from tilestamp.models.errors import TilestampError
 
 Progress = Callable[[str], None]
 Experiment = Callable[[Progress], Result]
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1]
 
 
 def experiment_names() -> list[str]:
