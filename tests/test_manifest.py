@@ -12,6 +12,7 @@ from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.harness.jobs import run_experiments
 from tilestamp.experiments.harness.result import Result
 from tilestamp.models.machine import FOLDER
+from tilestamp.models.price import price
 from tilestamp.models.used import collect, remembered
 from tilestamp.simulator import mix
 from tilestamp.simulator.manifest import used_manifest
@@ -165,6 +166,29 @@ def test_a_changed_mix_changes_the_manifest_of_an_experiment(tmp_path, monkeypat
     mix.load_mix.cache_clear()
     after = made_by(experiment, tmp_path, monkeypatch)
     assert [key for key in before if before[key] != after[key]] == ["mixes"]
+
+
+def test_a_quarter_of_the_clock_in_a_machine_file_changes_the_manifest_of_an_experiment(tmp_path, monkeypatch):
+    def experiment(_):
+        draw()
+        return Result("a/x", "", "", [])
+
+    before = made_by(experiment, tmp_path, monkeypatch)
+    shutil.copytree(FOLDER, tmp_path / "machines")
+    path = tmp_path / "machines" / "gtx480.toml"
+    text = path.read_text()
+    assert "clock_mhz = { value = 1401" in text
+    path.write_text(text.replace("clock_mhz = { value = 1401", "clock_mhz = { value = 350"))
+    monkeypatch.setattr("tilestamp.models.machine.FOLDER", tmp_path / "machines")
+    after = made_by(experiment, tmp_path, monkeypatch)
+    assert [key for key in before if before[key] != after[key]] == ["machines", "runs"]
+
+
+def test_pricing_by_itself_counts_as_use_of_the_mix_and_of_the_machine():
+    run = simulate(triangle(), "freepipe", "gtx480", **SMALL)
+    with collect() as found:
+        price(run.launches, run.machine)
+    assert {kind: list(names) for kind, names in found.items()} == {"mixes": ["freepipe/cc2"], "machines": ["gtx480"]}
 
 
 def test_a_frame_that_was_remembered_counts_as_used_again():

@@ -80,7 +80,7 @@ def _manifest(result: Result, options: dict[str, Any], used: Used) -> dict[str, 
         "experiment": result.name,
         "source": result.source,
         **software(options.get("command", "")),
-        "options": options,
+        "options": {name: value for name, value in options.items() if name != "command"},
         "warnings": result.warnings,
         **used_manifest(used),
     }
