@@ -44,9 +44,10 @@ def reproduce(
     chosen = select(names, everything=all_)
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
-    options = {"names": list(names), "command": shlex.join(sys.argv)}
-    outcomes: dict[str, Outcome] = {}
+    _make(output)
     with progress(f"reproducing {len(chosen)} experiments") as say:
+        options = {"names": list(names), "command": shlex.join(sys.argv)}
+        outcomes: dict[str, Outcome] = {}
         for outcome in run_experiments(chosen, output, options, say, jobs or default_jobs()):
             outcomes[outcome.name] = outcome
             if outcome.result is not None and not json_:
@@ -59,9 +60,21 @@ def reproduce(
         sys.stdout.write(json.dumps(cells) + "\n")
     else:
         _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
-    failures = [f"tilestamp: {name} failed: {outcomes[name].failure}\n" for name in chosen if outcomes[name].failure]
-    sys.stderr.writelines(failures)
-    return FAILED if failures else 0
+    return _print_failures([outcomes[name] for name in chosen if outcomes[name].failure])
+
+
+def _make(output: Path) -> None:
+    """Make the folder for the results before anything is computed."""
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TilestampError(f"-o {output}: cannot be made ({error.strerror})") from error
+
+
+def _print_failures(failed: list[Outcome]) -> int:
+    """Name what failed, and why; give the exit code."""
+    sys.stderr.writelines(f"tilestamp: {outcome.name} failed: {outcome.failure}\n" for outcome in failed)
+    return FAILED if failed else 0
 
 
 def _print_end(output: Path, page: Path, left: set[str]) -> None:
@@ -76,15 +89,17 @@ def _print_result(result: Result) -> None:
     sys.stdout.write("\n")
     for warning in result.warnings:
         sys.stdout.write(f"! {warning}\n")
-    if not result.cells:
-        sys.stdout.write(f"{result.title} [{result.name}]\n")
-        return
-    rows = [cell_texts(cell) for cell in result.cells]
-    styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
-    print_table(f"{result.title} [{result.name}]", COLUMNS, rows, styles)
+    title = f"{result.title} [{result.name}]"
+    if result.cells:
+        rows = [cell_texts(cell) for cell in result.cells]
+        styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
+        print_table(title, COLUMNS, rows, styles)
+    else:
+        sys.stdout.write(f"{title}\n")
     errors = result.predicted_errors
     if errors:
         mean, worst = 100 * sum(errors) / len(errors), 100 * max(errors)
         sys.stdout.write(f"{len(errors)} predicted cells: mean absolute error {mean:.1f} %, worst {worst:.1f} %\n")
     for note in result.notes:
         sys.stdout.write(f"- {note}\n")
+    sys.stdout.flush()  # as they come, into a file too
