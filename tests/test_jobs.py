@@ -89,6 +89,11 @@ def test_a_worker_that_dies_is_a_sentence(tmp_path, monkeypatch):
     assert not active_children()
 
 
+def test_a_worker_whose_parent_is_gone_ends(tmp_path):
+    code = f"from tilestamp.experiments.harness.jobs import _send; _send('{tmp_path}/nobody', 'here')"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 1  # noqa: S603 - it is our own command
+
+
 COMMAND = """
 import signal
 from tilestamp.experiments.command_line import main

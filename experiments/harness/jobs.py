@@ -115,7 +115,8 @@ def _listener(say: Progress) -> Iterator[str]:
     with TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
         address = f"{folder}/progress"
         receiver.bind(address)
-        thread = Thread(target=_pass_on, args=(receiver, say), daemon=True)
+        lines = iter(partial(receiver.recv, LONGEST), b"")
+        thread = Thread(target=lambda: [say(line.decode()) for line in lines], daemon=True)
         thread.start()
         try:
             yield address
@@ -124,12 +125,10 @@ def _listener(say: Progress) -> Iterator[str]:
             thread.join()
 
 
-def _pass_on(receiver: socket.socket, say: Progress) -> None:
-    while line := receiver.recv(LONGEST):
-        say(line.decode())
-
-
 def _send(address: str, text: str) -> None:
-    """Say what is being done; an OSError where nobody listens any more."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
-        sender.sendto(text.encode()[:LONGEST], address)
+    """Say what is being done; where nobody listens any more, the parent is gone, and so are we."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.sendto(text.encode()[:LONGEST], address)
+    except OSError:
+        os._exit(1)
