@@ -8,6 +8,7 @@ import shutil
 import signal
 import socket
 import traceback
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -46,7 +47,7 @@ def run_experiments(
     options : dict
         For the manifests.
     say : callable
-        Told what is being done, from another thread.
+        Told what is being done; from another thread where there are several processes.
     jobs : int
         Processes; 1 runs everything in this one.
 
@@ -63,7 +64,8 @@ def run_experiments(
     left = dict.fromkeys(names)
     try:
         with _listener(say) as address:
-            tasks = [delayed(_run_all)(group, output, options, address) for group in groups]
+            told = say if jobs == 1 else partial(_send, address)
+            tasks = [delayed(_run_all)(group, output, options, told) for group in groups]
             resource_tracker.ensure_running()  # or joblib starts it in what follows, and it lets signals through
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers do not hear Ctrl-C: we end them
             try:
@@ -82,9 +84,9 @@ def run_experiments(
             shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], address: str) -> list[Outcome]:
+def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], say: Progress) -> list[Outcome]:
     """Run some experiments one after another, perhaps in a process of their own."""
-    return [_run(name, output, options, partial(_send, address)) for name in names]
+    return [_run(name, output, options, say) for name in names]
 
 
 def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Outcome:
@@ -115,8 +117,8 @@ def _listener(say: Progress) -> Iterator[str]:
     with TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
         address = f"{folder}/progress"
         receiver.bind(address)
-        lines = iter(partial(receiver.recv, LONGEST), b"")
-        thread = Thread(target=lambda: [say(line.decode()) for line in lines], daemon=True)
+        lines = map(bytes.decode, iter(partial(receiver.recv, LONGEST), b""))
+        thread = Thread(target=deque, args=(map(say, lines), 0), daemon=True)  # a deque without room: says them all
         thread.start()
         try:
             yield address
