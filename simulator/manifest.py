@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -24,9 +24,6 @@ from tilestamp.models.machine import Machine
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines import pipeline_options
 from tilestamp.simulator.scenes import Scene
-
-if TYPE_CHECKING:
-    from tilestamp.simulator.run import Run
 
 FLOORS = ("models", "simulator", "experiments", "reports")
 PACKAGES = ("numpy", "numba", "pandas", "matplotlib", "trimesh")
@@ -121,29 +118,10 @@ def machine_manifest(machine: Machine) -> dict[str, Any]:
     }
 
 
-def run_manifest(run: "Run") -> dict[str, Any]:
-    """All that made a run, as plain data."""
-    origin = run.origin
-    return software() | {
-        "date": origin.date if origin else now(),
-        "scene": {"name": run.scene, "digest": origin.scene_digest if origin else None, "note": run.note},
-        "pipeline": run.pipeline,
-        "options": resolved_options(run),
-        "machine": machine_manifest(run.machine),
-        "mix": mix_manifest(run),
-        "camera": origin.matrix.tolist() if origin else None,
-        "width": run.width,
-        "height": run.height,
-        "seed": origin.seed if origin else None,
-        "fidelity": run.fidelity,
-        "error": run.error,
-    }
-
-
-def resolved_options(run: "Run") -> dict[str, Any]:
-    """All options of a run's pipeline: as given, else their defaults."""
-    defaults = {name: option.default for name, option in pipeline_options(run.pipeline).items()}
-    plain: dict[str, Any] = msgspec.to_builtins(defaults | run.options, enc_hook=_plain)
+def resolved_options(pipeline: str, options: dict[str, Any]) -> dict[str, Any]:
+    """All options of a pipeline: as given, else their defaults."""
+    defaults = {name: option.default for name, option in pipeline_options(pipeline).items()}
+    plain: dict[str, Any] = msgspec.to_builtins(defaults | options, enc_hook=_plain)
     return plain
 
 
@@ -152,28 +130,25 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-def mix_manifest(run: "Run") -> dict[str, str] | None:
-    """Name and digest of the mix that prices a run; None for a pipeline that is fixed function throughout."""
+def mix_manifest(pipeline: str, machine: Machine) -> dict[str, str] | None:
+    """Name and digest of the mix that prices a pipeline; None where it is fixed function throughout."""
     try:
-        mix = load_mix(run.pipeline, run.machine.compute_capability)
+        mix = load_mix(pipeline, machine.compute_capability)
     except TilestampError:
         return None
     return {"name": mix.name, "digest": mix.digest}
 
 
-def note_run(run: "Run") -> None:
+def note_run(scene: str, origin: Origin | None, pipeline: str, machine: Machine, settings: tuple[Any, ...]) -> None:
     """Note a run, its machine, its mix and its scene for the manifest of whoever collects."""
-    used.note("machines", run.machine.name, run.machine.digest)
-    if (mix := mix_manifest(run)) is not None:
+    used.note("machines", machine.name, machine.digest)
+    if (mix := mix_manifest(pipeline, machine)) is not None:
         used.note("mixes", mix["name"], mix["digest"])
-    origin = run.origin
-    if origin is None:
-        return
-    used.note("scenes", run.scene, origin.scene_digest)
-    settings = (run.width, run.height, run.fidelity, run.error, origin.seed, run.options, origin.matrix.tolist())
-    text = f"{origin.scene_digest} {run.machine.digest} {settings}"
-    name = f"{run.scene} by {run.pipeline} on {run.machine.name}"
-    used.note("runs", name, hashlib.sha256(text.encode()).hexdigest()[:DIGITS])
+    if origin is not None:
+        used.note("scenes", scene, origin.scene_digest)
+        text = f"{origin.scene_digest} {machine.digest} {origin.matrix.tolist()} {origin.seed} {settings}"
+        digest = hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+        used.note("runs", f"{scene} by {pipeline} on {machine.name}", digest)
 
 
 def used_manifest(found: used.Used) -> dict[str, dict[str, str]]:

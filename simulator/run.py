@@ -15,7 +15,7 @@ from tilestamp.models.timing import Timing
 from tilestamp.simulator import intervals
 from tilestamp.simulator.estimate import Estimate
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.manifest import Origin, note_run, run_manifest
+from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, resolved_options, software
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stage_table import interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
@@ -45,7 +45,8 @@ class Run:
 
     def __post_init__(self) -> None:
         """Note it for the manifest of whoever collects."""
-        note_run(self)
+        settings = (self.width, self.height, self.fidelity, self.error, self.options)
+        note_run(self.scene, self.origin, self.pipeline, self.machine, settings)
 
     @property
     def counted(self) -> bool:
@@ -176,4 +177,18 @@ class Run:
 
     def manifest(self) -> dict[str, Any]:
         """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""
-        return run_manifest(self)
+        origin = self.origin
+        return software() | {
+            "date": origin.date if origin else None,
+            "scene": {"name": self.scene, "digest": origin.scene_digest if origin else None, "note": self.note},
+            "pipeline": self.pipeline,
+            "options": resolved_options(self.pipeline, self.options),
+            "machine": machine_manifest(self.machine),
+            "mix": mix_manifest(self.pipeline, self.machine),
+            "camera": origin.matrix.tolist() if origin else None,
+            "width": self.width,
+            "height": self.height,
+            "seed": origin.seed if origin else None,
+            "fidelity": self.fidelity,
+            "error": self.error,
+        }

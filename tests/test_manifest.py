@@ -171,7 +171,7 @@ def test_a_changed_mix_changes_the_manifest_of_an_experiment(tmp_path, monkeypat
 def test_a_quarter_of_the_clock_in_a_machine_file_changes_the_manifest_of_an_experiment(tmp_path, monkeypatch):
     def experiment(_):
         draw()
-        return Result("a/x", "", "", [])
+        return Result(name="a/x", title="", source="", cells=[])
 
     before = made_by(experiment, tmp_path, monkeypatch)
     shutil.copytree(FOLDER, tmp_path / "machines")
