@@ -17,6 +17,7 @@ from tilestamp.models.timing import Timing
 from tilestamp.simulator import intervals
 from tilestamp.simulator.estimate import Estimate
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
@@ -42,6 +43,13 @@ class Run:
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
+
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        """Note it for the manifest of whoever collects."""
+        settings = (self.width, self.height, self.fidelity, self.error, self.options)
+        note_run(self.scene, self.origin, self.pipeline, self.machine, settings)
 
     @property
     def counted(self) -> bool:
@@ -174,3 +182,21 @@ class Run:
     def on(self, machine: Machine | str | Path, fidelity: Fidelity | None = None) -> "Run":
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
         return replace(self, machine=load_machine(machine), fidelity=fidelity or self.fidelity)
+
+    def manifest(self) -> dict[str, Any]:
+        """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""
+        origin = self.origin
+        return software() | {
+            "date": origin.date if origin else None,
+            "scene": {"name": self.scene, "digest": origin.scene_digest if origin else None, "note": self.note},
+            "pipeline": self.pipeline,
+            "options": self.options,
+            "machine": machine_manifest(self.machine),
+            "mix": mix_manifest(self.pipeline, self.machine),
+            "camera": origin.matrix.tolist() if origin else None,
+            "width": self.width,
+            "height": self.height,
+            "seed": origin.seed if origin else None,
+            "fidelity": self.fidelity,
+            "error": self.error,
+        }

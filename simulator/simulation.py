@@ -13,6 +13,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity
 from tilestamp.simulator.launchable import check_launches
+from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import Options, plain
 from tilestamp.simulator.pipelines import can_take, load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
@@ -83,7 +84,8 @@ def simulate(
     if drawing.fidelity != "counts" and getattr(chosen, "counting", True):
         check_launches(pipeline, chosen, machine)
     matrix = clip_matrix(read_camera(camera, scene), width, height)
-    run = partial(Run, scene.name, pipeline, machine, width, height, drawing.fidelity, plain(chosen))
+    origin = origin_of(scene, matrix, drawing.seed)
+    run = partial(Run, scene.name, pipeline, machine, width, height, drawing.fidelity, plain(chosen), origin=origin)
     draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, chosen)
     note = scene.note
     without_picture = {"picture": False} if can_take(pipeline, "picture") else {}

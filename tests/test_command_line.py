@@ -75,6 +75,7 @@ def test_list_says_what_each_thing_is(kind, capsys):
         (["render", "teapot", *SMALL, "--map", "quads"], "-o"),
         (["render", "teapot", *SMALL, "--camera", "missing.json"], "missing.json"),
         (["reproduce", "no-such-table"], "no-such-table"),
+        (["reproduce", "laine2011/memory", "-o", "/dev/null/results"], "/dev/null/results"),
         (["list", "planets"], "planets"),
         (["paint"], "paint"),
     ],

@@ -7,7 +7,7 @@ import pytest
 
 from tilestamp import load_scene
 from tilestamp.experiments.eisenacher2010 import claims, figure4, frames, table1, table2, table3
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.harness.result import Result
 from tilestamp.simulator.run import Run
 
 EXPERIMENTS = (claims, figure4, table1, table2, table3)

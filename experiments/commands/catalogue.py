@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import option_table
 from tilestamp.experiments.commands.terminal import print_wrapped
-from tilestamp.experiments.registry import describe, experiment_names, is_slow
+from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import list_machines, load_machine
 from tilestamp.simulator.launchable import launchable_values, listed

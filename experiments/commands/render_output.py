@@ -69,6 +69,7 @@ def as_json(run: Run) -> dict[str, Any]:
         "counts": run.counts if run.counted else {},
         "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
         "warnings": list(run.frame.remarks),
+        "manifest": run.manifest(),
     }
 
 

@@ -3,6 +3,7 @@
 from functools import cache
 
 from tilestamp.models.price import Fidelity
+from tilestamp.models.used import remembered
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import scene_or_stand_in
 from tilestamp.simulator.scenes.scene import Scene
@@ -20,7 +21,7 @@ def model(name: str) -> Scene:
     return scene_or_stand_in(name)
 
 
-@cache
+@remembered
 def frame(
     name: str = "killeroo",
     width: int = 1600,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.ru2016.setting import MODELS_TILE, SOURCE, draw, missing, published
 from tilestamp.simulator.run import Run
 
