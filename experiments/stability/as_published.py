@@ -9,9 +9,9 @@ Zhang's PrimitiveBinning has no row: none of 1,000 frames on an H200 showed what
 from typing import Any
 
 import numpy as np
+
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Result
-
 from tilestamp.experiments.stability.boundary import Boundary, Scale, atlas_result, bisect
 from tilestamp.experiments.stability.methods import MACHINE, draw, flat_scene, machine
 from tilestamp.simulator.run import Run

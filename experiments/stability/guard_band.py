@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Result
-
 from tilestamp.experiments.stability.boundary import Boundary, Scale, atlas_result, bisect
 from tilestamp.experiments.stability.clipping import PIPELINES, by_pipeline
 from tilestamp.experiments.stability.methods import MACHINE, draw
