@@ -136,7 +136,7 @@ def ends(units: Loads) -> tuple[float, float, float]:
     extra = crowd(units)
     crowded = _ends(units, units.alone + extra, units.places)
     last = crowded[2]
-    waited = float(extra[last : last + 1].sum() + extra[:last].sum() / units.places)
+    waited = float(extra[last] + extra[:last].sum() / units.places) if len(extra) else 0.0
     if waited and units.alone.sum() / units.sms < crowded[0]:
         lonely = _ends(units, units.alone, units.sms)
         if lonely[0] < crowded[0]:
