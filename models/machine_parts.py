@@ -112,9 +112,8 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
     bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
-    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores of whole lines; 0: the same
-    l1_gather_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for the scattered sectors of a load; 0: the same
-    l1_scatter_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for scattered sectors; 0: the same
+    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
+    l1_local_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for local memory, in whole lines; 0: the same
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
