@@ -16,7 +16,7 @@ from tilestamp.models.fidelity_bound import latest_end
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import list_machines, load_machine
 from tilestamp.models.price import price
-from tilestamp.models.schedule import loads, played, schedule, start_up
+from tilestamp.models.schedule import loads, played, schedule
 from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.pipelines import pipeline_names
 
@@ -47,7 +47,7 @@ def launch(units, block=64, dispatch="blocks", grid=None, **events):
 def latest_cycles(what, machine, moved=NOTHING):
     """Cycles of a launch that its schedule cannot exceed."""
     asked = asked_of(what, machine, moved)
-    end = latest_end(loads(asked)) + start_up(asked)
+    end = latest_end(loads(asked))
     return asked.terms["launch"] + max(end, longest(asked.terms, asked.units))
 
 
@@ -141,7 +141,7 @@ def test_a_launch_of_unlike_units_is_escalated_and_names_its_tail():
 
 
 def test_a_launch_of_equal_units_that_only_wait_stays_at_its_roofline():
-    what, machine = launch(132 * 32 * 50, CHAIN_LOAD=600), H200
+    what, machine = launch(132 * 32 * 50, CHAIN_LOAD=2000), H200
     (got,) = price([what], machine, "auto")
     assert got.fidelity == "bounds"
     assert got.cycles == bounds(what, machine, traffic([what], machine)[0]).cycles
