@@ -147,7 +147,7 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
     """
     table = msgspec.to_builtins(machine)
     changes = dict(machine.changes)
-    values = _same_lanes(machine, values) | dict(values)
+    values = _same_lanes(machine, values) | {key: _plain_number(value) for key, value in values.items()}
     for key, value in values.items():
         *path, last = key.split(".")
         section = table
@@ -225,11 +225,15 @@ def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]
 def _plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
     """Numbers of NumPy, and whole floats where an int belongs, as Python's own."""
     kinds = get_type_hints(struct)
-    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
+    plain = {key: _plain_number(value) for key, value in values.items()}
     return {
         key: int(value) if kinds.get(key) is int and isinstance(value, float) and value.is_integer() else value
         for key, value in plain.items()
     }
+
+
+def _plain_number(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _sentence(error: str, sections: dict[str, Any]) -> str:
