@@ -11,13 +11,13 @@ import hashlib
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, get_type_hints
+from typing import Any, Literal
 
 import msgspec
 import msgspec.structs
-import numpy as np
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.models.used import note
@@ -147,7 +147,9 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
     """
     table = msgspec.to_builtins(machine)
     changes = dict(machine.changes)
-    values = _same_lanes(machine, values) | {key: _plain_number(value) for key, value in values.items()}
+    values = same_lanes(machine.sm.warp_size, machine.issue, machine.pipe, values) | {
+        key: plain_number(value) for key, value in values.items()
+    }
     for key, value in values.items():
         *path, last = key.split(".")
         section = table
@@ -165,18 +167,6 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
     changed = msgspec.structs.replace(_convert(sections, origins, machine.name), **marks)
     note("machines", changed.name, changed.digest)
     return changed
-
-
-def _same_lanes(machine: Machine, values: Mapping[str, Any]) -> dict[str, float]:
-    """Cycles of an instruction where a warp has another size."""
-    lanes = values.get("sm.warp_size")
-    if not isinstance(lanes, int | float | np.number) or lanes == machine.sm.warp_size:
-        return {}
-    ratio = float(lanes) / machine.sm.warp_size
-    issue = {
-        f"issue.{name}": max(min(1.0, old), old * ratio) for name, old in msgspec.structs.asdict(machine.issue).items()
-    }
-    return issue | {f"pipe.{name}": old * ratio for name, old in msgspec.structs.asdict(machine.pipe).items()}
 
 
 def _build(table: dict[str, Any], file: str) -> Machine:
@@ -211,47 +201,15 @@ def _plain(table: dict[str, Any], prefix: str, origins: dict[str, tuple[Provenan
 
 
 def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]], file: str) -> Machine:
-    sections = {name: _plain_numbers(values, SECTIONS[name]) for name, values in sections.items()}
+    sections = {name: plain_numbers(values, SECTIONS[name]) for name, values in sections.items()}
     whole = {"fixed_function": None} | sections | {"provenance": origins, "digest": ""}
     try:
         machine = msgspec.convert(whole, Machine)
     except msgspec.ValidationError as error:
-        raise TilestampError(f"{file}: {_sentence(str(error), sections)}") from error
+        raise TilestampError(f"{file}: {refusal(str(error), sections, SECTIONS)}") from error
     _check_sense(machine, file)
     digest = hashlib.sha256(msgspec.json.encode(sections, order="deterministic")).hexdigest()[:16]
     return msgspec.structs.replace(machine, digest=digest)
-
-
-def _plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
-    """Numbers of NumPy, and whole floats where an int belongs, as Python's own."""
-    kinds = get_type_hints(struct)
-    plain = {key: _plain_number(value) for key, value in values.items()}
-    return {
-        key: int(value) if kinds.get(key) is int and isinstance(value, float) and value.is_integer() else value
-        for key, value in plain.items()
-    }
-
-
-def _plain_number(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _sentence(error: str, sections: dict[str, Any]) -> str:
-    """Say which number no machine can have, and the range."""
-    message, _, place = error.replace("`", "").partition(" - at $.")
-    section, _, key = place.partition(".")
-    field = get_type_hints(SECTIONS[section], include_extras=True).get(key) if section in SECTIONS else None
-    value = sections.get(section, {}).get(key)
-    limits = getattr(field, "__metadata__", (None,))[0]
-    if not isinstance(limits, msgspec.Meta) or isinstance(value, str | bool):
-        return f"{message} - at {place}"
-    low, high = limits.ge if limits.gt is None else limits.gt, limits.le
-    kind = "a whole number" if get_type_hints(SECTIONS[section])[key] is int else "a number"
-    return f"{place} is {value}, and no machine has that: it is {kind} from {_read(low)} to {_read(high)}"
-
-
-def _read(limit: float | None) -> str:
-    return f"{limit:,.0f}" if limit and limit >= 1 else f"{limit:g}"
 
 
 def _check_keys(table: Any, known: list[str], optional: set[str], what: str, file: str) -> None:
