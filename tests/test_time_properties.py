@@ -268,13 +268,21 @@ def test_an_sm_sends_its_atomics_at_its_own_rate_however_many_sms_there_are():
     assert times[0] == pytest.approx(10**5 / 0.987 / 1970.7, rel=0.05)
 
 
-def test_two_that_want_the_sm_together_are_half_of_the_time_in_each_others_way():
-    """133 equal blocks whose instructions take half of their own time: two of them share an SM."""
-    what = launch_of(266, 32, CONTROL=0, LOAD=10**5, CHAIN_ALU=10**5)
+@pytest.mark.parametrize(("blocks", "shared"), [(140, 8 / 132), (396, 1.0)])
+def test_two_that_want_the_sm_together_are_half_of_the_time_in_each_others_way(blocks, shared):
+    """Neighbours' work is that of the blocks beyond one an SM; of more than a block's own no more than that counts."""
     sm, alone = 10**5 / 4, START + 10**5 * AT_ONCE.latency.alu_cycles
-    got = schedule(what, AT_ONCE, NOTHING)
-    neighbours = sm * (266 - 132) / 132
-    assert got.cycles == pytest.approx(OVERHEAD + alone + 0.5 * min(sm, neighbours), rel=1e-4)
+    got = schedule(launch_of(blocks, 32, LOAD=10**5, CHAIN_ALU=10**5), AT_ONCE, NOTHING)
+    assert got.cycles == pytest.approx(OVERHEAD + alone + 0.5 * shared * sm, rel=1e-4)
+
+
+def test_a_block_more_on_an_sm_never_makes_a_long_block_late():
+    """Alone on its SM the long block ends by itself; the others then have 131 SMs, and time enough."""
+    chains = np.full(264, 10.0)
+    chains[0] = 10**4
+    what = launch_of(264, 32, CHAIN_LOAD=chains, LOAD=2000)
+    one, many = (schedule(what, altered(AT_ONCE, {"sm.max_blocks": n}, "assumed", "a test"), NOTHING) for n in (1, 32))
+    assert one.cycles == many.cycles == pytest.approx(OVERHEAD + START + 10**4 * DRAM)
 
 
 def test_equal_blocks_spread_by_what_they_are_in_each_others_way():
