@@ -12,7 +12,7 @@ from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import FIDELITIES, Fidelity
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options, takes
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists

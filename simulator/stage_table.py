@@ -9,7 +9,7 @@ from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.fixed_function import PipeLaunch
 from tilestamp.models.launch import Launch
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.estimate import Estimate
+from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:

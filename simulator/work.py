@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.fixed_function import PipeLaunch
 from tilestamp.models.launch import Stream
-from tilestamp.simulator.strata import Sample
+from tilestamp.simulator.sampling.strata import Sample
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import pytest
 
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.estimate import Estimate, t_quantile
+from tilestamp.simulator.sampling.estimate import Estimate, t_quantile
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampler import Sampler
-from tilestamp.simulator.sampling import enlarged, expanded, totals
-from tilestamp.simulator.strata import Sample, drawn, make_strata, pilot
+from tilestamp.simulator.sampling.executor import Sampler
+from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
+from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
 from tilestamp.simulator.work import Work
 
 SEEDS = 200
@@ -23,7 +23,7 @@ MICRO = {"width": 320, "height": 240, "bound": 3}
 @pytest.fixture
 def small_frames(monkeypatch):
     """Sample frames that are too small to be worth it."""
-    monkeypatch.setattr("tilestamp.simulator.sampler.SMALLEST", 1)
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.SMALLEST", 1)
 
 
 def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.sampling_plot import sampling_plot
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampler import SMALLEST
+from tilestamp.simulator.sampling.executor import SMALLEST
 from tilestamp.simulator.scenes.library import load_scene, with_views
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate

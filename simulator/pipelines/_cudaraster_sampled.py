@@ -13,7 +13,7 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._cudaraster_facts import first_room
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
 from tilestamp.simulator.stages.laine2011.fine_raster import (

@@ -23,7 +23,7 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
 )
 from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
 from tilestamp.simulator.pipelines._cudaraster_sampled import sampled_draw
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles

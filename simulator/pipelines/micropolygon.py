@@ -15,7 +15,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
 from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010 import snap_edges as snapping
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split

@@ -24,7 +24,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.stages.eisenacher2010.bezier import LANES, screen_points
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine

@@ -18,7 +18,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.work import Work
 
 STAGE = "bound_and_split"

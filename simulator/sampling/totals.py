@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.estimate import Floats, Integers, Totals, t_quantile
-from tilestamp.simulator.strata import Sample, drawn, places
+from tilestamp.simulator.sampling.estimate import Floats, Integers, Totals, t_quantile
+from tilestamp.simulator.sampling.strata import Sample, drawn, places
 
 ENOUGH = 16  # units that ran for each thing known, before rows are predicted by them
 FEWEST_KNOWN = 2  # things: 1, and the size

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.estimate import Floats, Integers
+from tilestamp.simulator.sampling.estimate import Floats, Integers
 
 CERTAIN = 24  # largest units, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum

@@ -11,8 +11,8 @@ from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
-from tilestamp.simulator.estimate import Estimate, Totals
-from tilestamp.simulator.sampling import totals
+from tilestamp.simulator.sampling.estimate import Estimate, Totals
+from tilestamp.simulator.sampling.totals import totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 UNPLAYED = 0.45  # of the time beyond the roofline: measured over seeds (killeroo and teapot on a GTX 280)

@@ -1,0 +1,131 @@
+"""The executor of a sampled run: part of the units of a stage, and more of them until the answer is close enough."""
+
+import time
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.demand import demand
+from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.machine import Machine
+from tilestamp.models.traffic import Traffic
+from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.sampling.estimate import Floats, Integers
+from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
+from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
+from tilestamp.simulator.stage import Divisible, StageResult
+from tilestamp.simulator.work import Work
+
+ROUNDS = 6  # enlargements at most; then everything runs
+MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
+SMALLEST = 100_000  # sizes of all units together, list entries; below, a sample and its price cost more than it saves
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass
+class Part:
+    """A stage of which part of the units ran.
+
+    Parameters
+    ----------
+    stage : Divisible
+    inputs : dict
+        By name.
+    sample : Sample
+    seconds : float
+        CPU seconds that running them took.
+    """
+
+    stage: Divisible[Any, Any]
+    inputs: dict[str, Any]
+    sample: Sample
+    seconds: float = 0.0
+
+    def grow(self, taken: Integers) -> None:
+        """Run the units that ``taken`` has more than the sample."""
+        strata, begin = self.sample.strata, time.process_time()
+        old, new = drawn(strata, self.sample.taken), drawn(strata, taken)
+        fresh = np.setdiff1d(new, old)
+        rows = self.stage.run(**self.inputs, units=fresh)[1]
+        table = np.empty((len(strata.order), rows.shape[1]), np.int64)
+        table[fresh] = rows
+        if len(old):
+            table[old] = self.sample.rows
+        self.sample = Sample(strata, taken, table[new])
+        self.seconds += time.process_time() - begin
+
+    def work(self) -> Work:
+        """Work of all units: as they ran, or as those that ran foretell."""
+        return replace(self.stage.work(expanded(self.sample), **self.inputs), sample=self.sample)
+
+
+class SampledExecutor(Executor):
+    """Runs part of the units of the stages that can, and no picture.
+
+    Parameters
+    ----------
+    error : float
+        Largest half-width of a stage's time, instructions, sample tests and hits, over their value.
+    seed : int
+    pipeline : str
+        Whose mix says what an instruction is.
+    machine : Machine
+    """
+
+    def __init__(self, error: float, seed: int, pipeline: str, machine: Machine) -> None:
+        super().__init__(picture=False)
+        self.error, self.seed, self.pipeline, self.machine = error, seed, pipeline, machine
+        self.parts: dict[int, Part] = {}  # by place among the works
+        self.too_small = False  # a stage could run in part, and was too small to
+
+    def last(self, stage: Divisible[P, T], *inputs: P.args, **options: P.kwargs) -> StageResult[T]:
+        """Run part of a stage's units: enough that all that the run asks for is known within the error."""
+        named = stage.inputs(*inputs, **options)
+        size, *more = stage.known(**named)
+        if size.sum() < SMALLEST:
+            self.too_small = True
+            return self(stage, *inputs, **options)
+        strata = make_strata(size, [self.seed, len(self.parts)], *more)
+        part = Part(stage, named, Sample(strata, np.zeros_like(strata.units), np.zeros((0, 0), np.int64)))
+        part.grow(pilot(strata))
+        for left in reversed(range(ROUNDS)):
+            measured = self._measures(part)
+            found = totals(part.sample, measured)
+            if (found.half_width <= self.error * np.abs(found.value)).all():
+                break
+            part.grow(enlarged(part.sample, measured, self.error) if left else strata.units)
+        self.parts[len(self.works)] = part
+        self.works.append(part.work())
+        return StageResult(stage.run(**named, units=strata.order[:0])[0], (self.works[-1],))
+
+    def _measures(self, part: Part) -> Floats:
+        """What the answer is made of, of each unit that ran: instructions, cycles, main counts; (units, quantities)."""
+        rows = part.sample.rows
+        work = replace(part.stage.work(rows, **part.inputs), streams=())
+        launch = load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
+        asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
+        counts = [rows[:, work.events[name]] for name in MAIN_COUNTS if name in work.events.__members__]
+        instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
+        return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)
+
+    def finish(self, index: int) -> None:
+        """Run all units of a stage of which part ran."""
+        part = self.parts[index]
+        part.grow(part.sample.strata.units)
+        self.works[index] = part.work()
+
+    @property
+    def units(self) -> dict[str, tuple[int, int]]:
+        """Units that ran, and all, by kernel."""
+        ran: dict[str, tuple[int, int]] = {}
+        for index, part in self.parts.items():
+            kernel, sample = self.works[index].kernel, part.sample
+            before = ran.get(kernel, (0, 0))
+            ran[kernel] = before[0] + int(sample.taken.sum()), before[1] + len(sample.strata.order)
+        return ran
