@@ -7,10 +7,12 @@ and the counts are wanted, and no later stage the outputs, by ``execute.last``: 
 
 from collections.abc import Callable
 from inspect import signature
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from tilestamp.simulator.stage import Divisible, StageResult
-from tilestamp.simulator.work import FixedFunctionWork, Work
+
+if TYPE_CHECKING:
+    from tilestamp.simulator.work import FixedFunctionWork, Work
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -13,10 +13,10 @@ from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.sampling import intervals
-from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.sampling import intervals
+from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.stage_table import interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 

@@ -1,18 +1,16 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
-from dataclasses import replace
-from functools import partial
 from typing import Any
-
-import numpy as np
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import FIDELITIES, Fidelity
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_options, takes
+from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampling.executor import Sampler
+from tilestamp.simulator.sampling.completed import completed
+from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
@@ -78,46 +76,10 @@ def simulate(
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    run = partial(Run, scene.name, pipeline, machine, width, height, fidelity, options)
-    draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, **options)
-    note = scene.note
-    without_picture = {"picture": False} if takes(pipeline, "picture") else {}
-    if error and takes(pipeline, "sample"):
-        sampler = Sampler(error, seed, pipeline, machine)
-        frame = draw(sample=sampler, **without_picture)
-        if sampler.executed:
-            facts = {"units": sampler.executed, "seconds_saved": sampler.seconds_saved}
-            return _escalated(run(frame, note, error, facts), sampler)
-        return run(frame, _joined(note, "everything ran: a sample would cost more"), error)
-    if error:
-        note = _joined(note, f"everything ran: {pipeline} cannot be sampled")
-    return run(draw(**{} if picture else without_picture), note, error)
-
-
-def _joined(*notes: str) -> str:
-    return "; ".join(filter(None, notes))
-
-
-def _escalated(run: Run, sampler: Sampler) -> Run:
-    """Run all units of the launches, the least sure first, whose samples do not tell the frame's time within the error.
-
-    A stage whose tail decides is one: which unit meets which, only all units say.
-    """
-    if run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error:
-        return run
-    half = np.array([found["milliseconds"].half_width for found in run.launch_intervals])
-    order = np.argsort(-half)
-    left = np.cumsum(half[order][::-1] ** 2)[::-1]  # of the variance, before each is escalated
-    chosen = order[(left > (run.error * run.milliseconds) ** 2) & (half[order] > 0)]
-    works = list(run.frame.works)
-    for index in chosen:
-        works[index] = sampler.finished(works[index])
-    kernels = dict.fromkeys(works[index].kernel for index in sorted(chosen))
-    note = _joined(
-        run.note, f"all units ran of {', '.join(kernels)}: its tail decides, or part of it did not tell enough"
-    )
-    facts = run.sampled | {"seconds_saved": sampler.seconds_saved}
-    return replace(run, frame=replace(run.frame, works=works), note=note, sampled=facts)
+    execute = SampledExecutor(error, seed, pipeline, machine) if error else Executor(picture=picture)
+    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, execute, **options)
+    run = Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note, error)
+    return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 
 def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.work import FixedFunctionWork, Work
+from tilestamp.simulator.work import Work
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -33,14 +33,14 @@ class StageResult(NamedTuple, Generic[T]):
     ----------
     outputs
         What the stages behind it take.
-    works : sequence of Work or FixedFunctionWork
+    works : tuple of Work
         One for each kernel launch; none where nothing was counted.
     facts : dict
         What a report may say besides.
     """
 
     outputs: T
-    works: tuple[Work | FixedFunctionWork, ...] = ()
+    works: tuple[Work, ...] = ()
     facts: Mapping[str, Any] = {}
 
 

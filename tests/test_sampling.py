@@ -8,11 +8,11 @@ import pytest
 
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.sampling.estimate import Estimate, t_quantile
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.sampling.estimate import Estimate, t_quantile
 from tilestamp.simulator.sampling.executor import Sampler
-from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
 from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
+from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
 from tilestamp.simulator.work import Work
 
 SEEDS = 200

@@ -4,7 +4,7 @@ Triangle setup culls and prepares, bin raster queues triangles by 128x128 pixels
 raster draws each 8x8 tile in shared memory.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._cudaraster_facts import (
     Counters,
@@ -22,8 +23,6 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
     setup_counters,
 )
 from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
-from tilestamp.simulator.pipelines._cudaraster_sampled import sampled_draw
-from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
@@ -32,7 +31,6 @@ from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
-from tilestamp.simulator.work import Work
 
 MAX_BATCHES = 1024
 
@@ -41,17 +39,17 @@ MAX_BATCHES = 1024
 class _State:
     """What draws of one frame hand on: capacities, pixels and sums."""
 
+    execute: Executor
     options: dict[str, Any]
     size: tuple[int, int]
     simt: Simt
-    counting: bool
     colors: NDArray[np.float32] | None
     first_frame: bool
+    whole: bool  # later draws need the pixels
     capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
     buffers: FrameBuffers | None = None
-    works: list[Work] = field(default_factory=list)
     counters: Counters = field(default_factory=dict)
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
 
@@ -62,6 +60,7 @@ def cudaraster(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     release: Release = "1.1",
     msaa: int = 1,
@@ -71,9 +70,6 @@ def cudaraster(
     batches: int = 1,
     copy_parameters: bool = False,
     first_frame: bool = False,
-    counting: bool = True,
-    sample: Sampler | None = None,
-    picture: bool = True,
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
@@ -87,6 +83,8 @@ def cudaraster(
         Pixels, at most 2048.
     simt : Simt
         The machine's shape.
+    execute : Executor
+        Several batches share their pixels: then all units run.
     release : {"1.1", "nvdiffrast"}
     msaa : int
         1, 2, 4 or 8 samples a pixel (nvdiffrast: 1).
@@ -105,11 +103,6 @@ def cudaraster(
     first_frame : bool
         Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
         they have grown in a frame before, as where frames are timed; ``facts["retries"]`` says how often.
-    counting : bool
-    sample : Sampler, optional
-        Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
-    picture : bool
-        Without it vertices have no colours, and no picture comes back.
 
     Returns
     -------
@@ -129,25 +122,22 @@ def cudaraster(
     positions = clip_positions(mesh, matrix)
     options: dict[str, Any] = {"release": release, "samples": msaa, "mode": mode}
     options |= {"cull_backfaces": cull_backfaces, "guard_band": guard_band}
-    if sample is not None and batches == 1 and sample.pays(len(mesh.triangles)):
-        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options, first_frame=first_frame)
-    colors = None if mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
-    state = _State(options, (width, height), simt, counting, colors, first_frame)
+    colors = None if mode == "depth-only" or not execute.picture else vertex_colors(mesh, matrix)
+    state = _State(execute, options, (width, height), simt, colors, first_frame, whole=batches > 1)
     for first, last in _batch_bounds(len(mesh.triangles), batches):
         _draw(state, positions, mesh.triangles[first:last], first)
-    if copy_parameters:
-        state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
-    if not picture:
-        return Frame.numbers(state.works, frame_facts(state.counters, state.needed, release, state.retries))
+    works = [with_parameter_copy(w) if copy_parameters and w.kernel in COPYING else w for w in execute.works]
+    facts = frame_facts(state.counters, state.needed, release, state.retries)
+    if not execute.picture:
+        return Frame.numbers(works, facts)
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
     image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
-    facts = frame_facts(state.counters, state.needed, release, state.retries)
     return Frame(
         image,
         state.buffers.depth[shown, :height, :width][::-1],
-        state.works,
+        works,
         ids,
         maps=state.maps,
         facts=facts,
@@ -161,43 +151,37 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
 
     A stage that overflows is executed to its end all the same; the kernels behind it return at once.
     """
-    width, height = state.size
+    execute, (width, height) = state.execute, state.size
     release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
     depth, _, _, interpolate = MODES[mode]
-    shape = {"width": width, "height": height, "simt": state.simt, "release": release, "counting": state.counting}
+    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": release}
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
     while True:
-        setup, setup_work, facts = triangle_setup(
-            positions, triangles, **shape, samples=samples, cull_backfaces=state.options["cull_backfaces"],
-            guard_band=state.options["guard_band"], depth=depth, interpolate=interpolate,
+        setup, prepared, facts = execute(
+            triangle_setup, positions, triangles, **shape, samples=samples, depth=depth, interpolate=interpolate,
+            cull_backfaces=state.options["cull_backfaces"], guard_band=state.options["guard_band"], variant=mode,
             capacity=state.capacity["numSubtris"] if state.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
-        setup_work = replace(setup_work, variant=mode)
-        state.works.append(setup_work)
         if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
             continue
-        queues, bin_work, bin_facts = bins.bin_raster(setup, **shape)
-        state.works.append(bin_work)
+        queues, _, bin_facts = execute(bins.bin_raster, setup, **shape)
         if _grow(state, "numBinSegs", bin_facts["num_bin_segments"], 256):
             continue
-        lists, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=clear, **shape)
-        state.works.append(tile_work)
+        lists, _, tile_facts = execute(tiles.coarse_raster, queues, setup, deferred_clear=clear, **shape)
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
-    state.buffers, fine_work = fine_raster(
-        setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
+    state.buffers, drawn, _ = (execute if state.whole else execute.last)(
+        fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
         colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
-    variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
-    state.works.append(replace(fine_work, variant=variant))
-    if state.counting:
-        drawn = int(np.count_nonzero(setup.subtriangles))
-        counters = setup_counters(setup_work, fine_work, drawn, len(triangles)) | bin_facts["counters"]
-        counters |= tile_facts["counters"] | fine_counters(fine_work, depth=depth, msaa=samples)
+    if execute.counting:
+        visible = int(np.count_nonzero(setup.subtriangles))
+        counters = setup_counters(prepared[0], drawn[0], visible, len(triangles)) | bin_facts["counters"]
+        counters |= tile_facts["counters"] | fine_counters(drawn[0], depth=depth, msaa=samples)
         state.counters = add_counters(state.counters, counters)
-    tile_maps(state.maps, lists, fine_work if state.counting else None)
+    tile_maps(state.maps, lists, drawn[0] if execute.counting else None)
 
 
 def _initial_capacity(state: _State, triangles: int) -> None:

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
-from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
-from tilestamp.simulator.sampling.executor import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010 import snap_edges as snapping
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import BoundRule, SubPatches, bound_and_split
@@ -35,6 +34,7 @@ def micropolygon(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     tile: int = 8,
     spp: int = 1,
@@ -47,9 +47,6 @@ def micropolygon(
     snap_edges: bool = False,
     hybrid: bool = False,
     texture: NDArray[np.uint8] | None = None,
-    counting: bool = True,
-    sample: Sampler | None = None,
-    picture: bool = True,
 ) -> Frame:
     """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 
@@ -62,6 +59,7 @@ def micropolygon(
     width, height : int
         Pixels.
     simt : Simt
+    execute : Executor
     tile : int
         Pixels a side of a screen tile: 4, 8, 16 or 32.
     spp : int
@@ -81,17 +79,11 @@ def micropolygon(
         Halvings that every sub-patch takes; as many as the deepest needs leave no cracks.
     snap_edges : bool
         Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks
-        (not in the paper). Its look-ups are counted and not priced. A sampled run then samples bound and split alone.
+        (not in the paper). Its look-ups are counted and not priced.
     hybrid : bool
         Give the diced grids to the fixed-function rasterizer.
     texture : ndarray, (H, W, 3 or 4), uint8, optional
         Laid over each patch.
-    counting : bool
-        Count what the machine does.
-    sample : Sampler, optional
-        Run part of the units; no picture comes back.
-    picture : bool
-        Without it vertices are not shaded, and no picture comes back.
 
     Returns
     -------
@@ -108,50 +100,29 @@ def micropolygon(
     if texture is not None and not isinstance(texture, np.ndarray):
         raise TilestampError(f"texture must be an array of (H, W, 3 or 4) bytes, not {texture!r}")
     points = scene.patches.points
+    textured = texture is not None
+    view: dict[str, Any] = {"matrix": matrix, "width": width, "height": height, "simt": simt}
     tiles = screen_tiles(width, height, tile, bound)
-    boxes: list[NDArray[np.float32]] | None = [] if sample and not hybrid and not snap_edges else None
-    subpatches, split = bound_and_split(
-        points, matrix, width, height, bound, simt, bound_rule=bound_rule, counting=counting, near=near,
-        min_depth=min_depth, wanted=boxes, sample=sample,
-    )  # fmt: skip
-    if sample and boxes and sample.pays(len(subpatches.patch)):
-        options = {"spp": spp, "box_tests": box_tests, "edges": edges}
-        view = matrix, width, height, simt
-        rest = sampled_back_end(
-            sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=options
-        )
-        return Frame.numbers([*split, *rest], _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS)))
-    grids, diced = dice(
-        points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
-    )
+    subpatches = execute(
+        bound_and_split, points, **view, bound=bound, bound_rule=bound_rule, near=near, min_depth=min_depth
+    ).outputs
+    grids = execute(dice, points, subpatches, **view, texture=texture, shaded=execute.picture).outputs
     if snap_edges:
-        snapped = snapping.snap_edges(subpatches, grids, snapping.shared_edges(points))
-        grids = snapped.grids
-        if counting:
-            diced += snapping.snap_works(snapped, len(points), simt, textured=texture is not None)
+        grids = execute(snapping.snap_edges, points, subpatches, grids, simt, textured=textured).outputs.grids
     if hybrid:
-        return draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
-    count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
-    start, scanned = bucket_scan(count, simt, counting=counting)
-    lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
-    image, depth, overdraw, drawn = tile_raster(
-        grids.vertices,
-        count,
-        start,
-        lists,
-        tiles,
-        width,
-        height,
-        simt,
-        spp=spp,
-        box_tests=box_tests,
-        edges=edges,
-        counting=counting,
-    )
-    works = [*split, *diced, *counted, *scanned, *written, *drawn]
-    maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
+        return draw_grids(execute, grids, width, height, _facts(subpatches, 0))
+    count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
+    start = execute(bucket_scan, count, simt).outputs
+    lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
+    pixels, drawn, _ = execute.last(
+        tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
+        spp=spp, box_tests=box_tests, edges=edges,
+    )  # fmt: skip
     facts = _facts(subpatches, len(lists))
-    return Frame(image, depth, works, maps=maps, facts=facts, tile=tile) if picture else Frame.numbers(works, facts)
+    if not execute.picture:
+        return Frame.numbers(execute.works, facts)
+    maps = {} if pixels.overdraw is None else _maps(drawn[0], count, pixels.overdraw, tiles)
+    return Frame(pixels.image, pixels.depth, execute.works, maps=maps, facts=facts, tile=tile)
 
 
 def _maps(

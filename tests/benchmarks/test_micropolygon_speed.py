@@ -31,7 +31,7 @@ def scene_and_matrix():
 @cache
 def grids():
     scene, matrix = scene_and_matrix()
-    subpatches, _ = bound_and_split(scene.patches.points, matrix, *SIZE, 4, GT200, counting=False)
+    subpatches, _, _ = bound_and_split(scene.patches.points, matrix, *SIZE, 4, GT200, counting=False)
     return dice(scene.patches.points, subpatches, matrix, *SIZE, GT200, counting=False)[0]
 
 

@@ -17,7 +17,9 @@ _PART_TILES = 256  # that one call of the worker takes, at least
 
 
 @kernel
-def _add_grids(part: Any, parts: Any, vertices: Any, count: Any, start: Any, lists: Any, tiles: Any, known: Any) -> None:
+def _add_grids(
+    part: Any, parts: Any, vertices: Any, count: Any, start: Any, lists: Any, tiles: Any, known: Any
+) -> None:
     """Pixels of boxes and of grids in each tile of one part; a grid's area is that of its two triangles."""
     for t in range(count.size * part // parts, count.size * (part + 1) // parts):
         left, top = np.float32(t % tiles.columns * tiles.size), np.float32(t // tiles.columns * tiles.size)

@@ -1,0 +1,40 @@
+"""The end of a sampled run: stages of which a part does not tell enough run in full, and the run says what was done."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.sampling.executor import SampledExecutor
+
+
+def completed(run: Run, execute: SampledExecutor) -> Run:
+    """Run all units of the launches, the least sure first, whose samples do not tell the frame's time within the error.
+
+    Parameters
+    ----------
+    run : Run
+    execute : SampledExecutor
+        Which ran its frame.
+    """
+    if not execute.parts:
+        why = "a sample would cost more" if execute.too_small else f"{run.pipeline} cannot be sampled"
+        return _noted(run, f"everything ran: {why}")
+    run = replace(run, sampled={"units": execute.units, "seconds_saved": execute.seconds_saved})
+    if run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error:
+        return run
+    half = np.array([found["milliseconds"].half_width for found in run.launch_intervals])
+    order = np.argsort(-half)
+    left = np.cumsum(half[order][::-1] ** 2)[::-1]  # of the variance, before each is run in full
+    chosen = order[(left > (run.error * run.milliseconds) ** 2) & (half[order] > 0)]
+    works = list(run.frame.works)
+    for index in chosen:
+        works[index] = execute.finished(index)
+    kernels = dict.fromkeys(works[index].kernel for index in sorted(chosen))
+    run = _noted(run, f"all units ran of {', '.join(kernels)}: part of them did not tell enough")
+    sampled = {"units": execute.units, "seconds_saved": execute.seconds_saved}
+    return replace(run, frame=replace(run.frame, works=works), sampled=sampled)
+
+
+def _noted(run: Run, note: str) -> Run:
+    return replace(run, note="; ".join(filter(None, (run.note, note))))
