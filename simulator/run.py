@@ -40,11 +40,8 @@ class Run:
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
-
-    @property
-    def counted(self) -> bool:
-        """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
-        return bool(self.options.get("counting", True))
+    counted: bool = True
+    """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
 
     def _check_counted(self) -> None:
         if not self.counted:

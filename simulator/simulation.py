@@ -27,6 +27,7 @@ def simulate(
     fidelity: Fidelity = "schedule",
     error: float = 0.0,
     seed: int = 0,
+    counting: bool = True,
     picture: bool = True,
     **options: Any,
 ) -> Run:
@@ -55,6 +56,8 @@ def simulate(
         of their value. Frames too small to pay for a sample run in full, and so do stages whose tail decides.
     seed : int
         Of the random part.
+    counting : bool
+        Count what the machine does; without it there is a picture, and nothing to price.
     picture : bool
         Whether one is wanted; without it what only makes the picture is skipped.
     **options
@@ -76,9 +79,14 @@ def simulate(
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
     matrix = view.matrix(width, height)
-    execute = SampledExecutor(error, seed, pipeline, machine) if error else Executor(picture=picture)
+    sampled = error and counting
+    execute = (
+        SampledExecutor(error, seed, pipeline, machine) if sampled else Executor(counting=counting, picture=picture)
+    )
     frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, execute, **options)
-    run = Run(scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note, error)
+    run = Run(
+        scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note, error, counted=counting
+    )
     return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 

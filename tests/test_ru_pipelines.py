@@ -11,6 +11,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines.per_primitive import per_primitive
 from tilestamp.simulator.pipelines.tiled import tiled
@@ -41,7 +42,7 @@ def matrix():
 
 
 def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
-    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, **options)
+    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, Executor(), **options)
 
 
 def work(frame, kernel):
@@ -63,7 +64,7 @@ def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipelin
 
 def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
     mesh = geometry(scene)
-    vertices, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
+    vertices, _, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
     frame = draw(scene, matrix)
     fragments = interpolate(mesh, vertices, Visible(frame.triangle_ids, frame.depth))
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
@@ -141,7 +142,7 @@ def test_a_warp_walks_the_widest_box_of_each_row_of_tiles(matrix):
         screen, np.arange(6, dtype=np.int32).reshape(2, 3), np.arange(2, dtype=np.int32), WIDTH, HEIGHT, SIMT,
         tile=8, culling=False, capacity="safe",
     )  # fmt: skip
-    assert lists[1][-1].counts()["BOX_STEPS"] == 4 + 1 + 1 + 1
+    assert lists.works[-1].counts()["BOX_STEPS"] == 4 + 1 + 1 + 1
 
 
 def test_each_part_of_a_model_is_transformed_and_assembled_by_itself(scene, matrix):

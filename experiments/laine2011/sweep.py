@@ -8,6 +8,7 @@ import numpy as np
 from tilestamp.experiments.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines import load_pipeline
 from tilestamp.simulator.run import Run
@@ -52,7 +53,7 @@ def draw(area: float) -> tuple[Run, int]:
     """Draw one area; give the run without its picture, and its triangles."""
     machine = load_machine(MACHINE)
     scene = Scene.sweep(area, WIDTH, HEIGHT)
-    frame = load_pipeline("cudaraster")(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, mode="color")
+    frame = load_pipeline("cudaraster")(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, Executor(), mode="color")
     assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)

@@ -144,7 +144,7 @@ def _triangles(simt: Simt) -> Iterator[GpuCase]:
         ids = (drawn.ids + 1).astype(np.uint32)
         unlike = partial(_unlike_low, frame, ids, clipped)
         yield GpuCase(0, 0, kernel, "freepipe", work, start, partial(frame.fill, 2**64 - 1), unlike)
-    setup, work, _ = triangle_setup(positions, mesh.triangles, WIDTH, HEIGHT, simt, release="nvdiffrast")
+    setup, (work,), _ = triangle_setup(positions, mesh.triangles, WIDTH, HEIGHT, simt, release="nvdiffrast")
     kept, headers, planes = cp.zeros(n, cp.uint8), cp.zeros((n, 4), cp.uint32), cp.zeros((n, 4), cp.uint32)
     start = _launcher(_triangle_code, "triangle_setup", work.grid, work.block, *inputs, kept, headers, planes, clipped)
 

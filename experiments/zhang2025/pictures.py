@@ -11,6 +11,7 @@ from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines import load_pipeline
 from tilestamp.simulator.scenes.camera import LookAt
@@ -44,7 +45,9 @@ def run(progress: Callable[[str], None]) -> Result:
     for name, (pipeline, machine, off, on) in PAIRS.items():
         progress(name)
         simt = load_machine(machine).simt
-        frames = [load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, **options) for options in (off, on)]
+        frames = [
+            load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, Executor(), **options) for options in (off, on)
+        ]
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]

@@ -9,6 +9,7 @@ from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.binned import binned
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.work import Work
@@ -42,7 +43,7 @@ def wall(minification: float, degrees: int) -> Scene:
 
 def shader(scene: Scene, simt: Simt, layout: str, texture_filter: str) -> Work:
     """Draw the wall and give the pixel shader's work."""
-    frame = binned(scene, np.eye(4), SIZE, SIZE, simt, texture_filter=texture_filter, **LAYOUTS[layout])  # type: ignore[arg-type]
+    frame = binned(scene, np.eye(4), SIZE, SIZE, simt, Executor(), texture_filter=texture_filter, **LAYOUTS[layout])  # type: ignore[arg-type]
     return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
 
 

@@ -1,5 +1,6 @@
 """What the micropolygon pipelines of 2009 and 2012 share: their input, and their picture as a frame."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,12 @@ from numpy.typing import NDArray
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 
-def frame_of(samples: Samples, polygons: Micropolygons, works: list[Work], **facts: Any) -> Frame:
+def frame_of(
+    samples: Samples, polygons: Micropolygons, works: Sequence[Work | FixedFunctionWork], **facts: Any
+) -> Frame:
     """Gather a frame: the picture, the nearest depth of each pixel's first sample, ids of patches or triangles."""
     depth = samples.depth.reshape(samples.height, samples.width, -1)[:, :, 0]
     found = {"micropolygons": len(polygons.patch), "dropped_polygons": polygons.dropped}

@@ -5,6 +5,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygon_options import frame_of
 from tilestamp.simulator.scenes.scene import Scene
@@ -21,6 +22,7 @@ def across_polygons(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     packing: Packing = "in-order",
     spp: int = 1,
@@ -32,7 +34,7 @@ def across_polygons(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         As for every pipeline.
     packing : {"in-order", "sorted", "repacked"}
         How polygons come to lanes.
@@ -41,5 +43,5 @@ def across_polygons(
     """
     samples = new_samples(width, height, sample_positions(spp, positions))
     polygons = micropolygons(scene, matrix, width, height, edge, triangles)
-    work = walk_boxes(polygons, samples, packing, simt)
-    return frame_of(samples, polygons, [work])
+    execute(walk_boxes, polygons, samples, packing, simt)
+    return frame_of(samples, polygons, execute.works)

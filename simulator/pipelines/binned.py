@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines.tiled import check_choices
 from tilestamp.simulator.scenes.scene import Scene
@@ -33,6 +34,7 @@ def binned(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     order: Order = "api",
     texture_filter: Filter = "trilinear",
@@ -48,7 +50,7 @@ def binned(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         See ``tilestamp.simulator.pipelines``; at most 2048 pixels on a side.
     order : {"api", "oit"}
         Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
@@ -84,28 +86,28 @@ def binned(
     )
     opaque = order == "api"
 
-    vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
-    slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=cull_backfaces)
-    primitives, compaction = primitive_compaction(slots, len(mesh.triangles), simt)
-    data, setup = triangle_setup(primitives, simt, triangles=len(mesh.triangles))
-    bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))
-    tiles, coarse = coarse_rasterizer(data, bins, width, height, simt, hi_z=opaque, unrolled=optimized)
-    fragments, fine = fine_rasterizer(data, tiles, width, height, simt, early_z=opaque, optimized=optimized)
-    stream, shader = pixel_shader(
-        data, tiles, fragments, chains, mesh.texture_ids, simt,
+    vertices = execute(vertex_fetch_and_shading, mesh, matrix, simt).outputs
+    slots = execute(primitive_assembly, mesh, vertices, width, height, simt, culling=cull_backfaces).outputs
+    primitives = execute(primitive_compaction, slots, len(mesh.triangles), simt).outputs
+    data = execute(triangle_setup, primitives, simt, triangles=len(mesh.triangles)).outputs
+    bins = execute(primitive_binning, data.boxes, width, height, simt, triangles=len(mesh.triangles)).outputs
+    tiles = execute(coarse_rasterizer, data, bins, width, height, simt, hi_z=opaque, unrolled=optimized).outputs
+    fragments = execute(fine_rasterizer, data, tiles, width, height, simt, early_z=opaque, optimized=optimized).outputs
+    stream = execute(
+        pixel_shader, data, tiles, fragments, chains, mesh.texture_ids, simt,
         texture_filter=texture_filter, opacity=opacity, optimized=optimized,
+    ).outputs  # fmt: skip
+    pixels, (resolve,), _ = execute(
+        rop, data, tiles, fragments, stream, simt, order=order, fragment_depth=fragment_depth,
+        limit=fragments_a_pixel, optimized=optimized,
     )  # fmt: skip
-    target, depth, winners, resolve = rop(
-        data, tiles, fragments, stream, simt, order=order, fragment_depth=fragment_depth, limit=fragments_a_pixel,
-        optimized=optimized,
-    )  # fmt: skip
-    image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
+    image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
 
     return Frame(
         image,
-        depth[::-1],
-        [shading, assembly, compaction, setup, binning, coarse, fine, shader, resolve, streaming],
-        triangle_ids=np.where(winners >= 0, mesh.ids[winners], -1).astype(np.int32)[::-1],
+        pixels.depth[::-1],
+        execute.works,
+        triangle_ids=np.where(pixels.winners >= 0, mesh.ids[pixels.winners], -1).astype(np.int32)[::-1],
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
         facts={
             "primitives after culling": len(data.ids),

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygon_options import frame_of, wrong_pixels
 from tilestamp.simulator.scenes.scene import Scene
@@ -23,6 +24,7 @@ def bit_mask(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     mask: MaskKind = "plain",
     lanes: int | None = None,
@@ -36,7 +38,7 @@ def bit_mask(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         As for every pipeline.
     mask : {"plain", "facing", "depth"}
         The paper's mask, one for each facing, or one that also looks at depth and is exact.
@@ -51,9 +53,9 @@ def bit_mask(
     samples, exact = new_samples(width, height, offsets), new_samples(width, height, offsets)
     made = micropolygons(scene, matrix, width, height, edge, triangles)
     masked = made if scene.patches is not None else grouped(made, group)
-    work = filter_samples(masked, samples, mask, simt.warp if lanes is None else lanes, simt)
+    execute(filter_samples, masked, samples, mask, simt.warp if lanes is None else lanes, simt)
     across_polygons(made, exact, "in-order", simt)  # the picture to compare with: no part of the work
     wrong = wrong_pixels(samples, exact)
-    frame = frame_of(samples, made, [work], wrong_pixels=int(wrong.sum()))
+    frame = frame_of(samples, made, execute.works, wrong_pixels=int(wrong.sum()))
     frame.maps["wrong"] = wrong.astype(np.int32)
     return frame

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing
@@ -18,17 +19,17 @@ def freepipe(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     packing: Packing = "64",
     early: bool = False,
     block: int = BLOCK,
-    counting: bool = True,
 ) -> Frame:
     """FreePipe: one thread a triangle, atomics on the frame buffer (Liu et al. 2010).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         See ``tilestamp.simulator.pipelines``.
     packing : {"64", "32"}
         One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then
@@ -37,7 +38,6 @@ def freepipe(
         Read the pixel before the atomic.
     block : int
         Threads in a block.
-    counting : bool
 
     Returns
     -------
@@ -48,9 +48,8 @@ def freepipe(
     positions = clip_positions(mesh, matrix)
     colors = vertex_colors(mesh, matrix)
     flat = _flat_colors(colors, mesh.triangles) if packing == "32" else None
-    frame, works, facts = draw(
-        positions, mesh.triangles, width, height, simt,
-        packing=packing, early=early, block=block, colors=flat, counting=counting,
+    frame, _, facts = execute(
+        draw, positions, mesh.triangles, width, height, simt, packing=packing, early=early, block=block, colors=flat,
     )  # fmt: skip
     if frame.colors is None:
         image = pixel_colors(frame.ids, positions, mesh.triangles, colors)
@@ -58,7 +57,7 @@ def freepipe(
         channels = np.stack([frame.colors >> np.uint32(8 * c) for c in (2, 1, 0)], axis=-1) & np.uint32(255)
         image = (channels * (frame.ids >= 0)[..., None]).astype(np.uint8)
     maps = {"tied_pixels": frame.tied[::-1], "mixed_pixels": frame.mixed[::-1]}
-    return Frame(image[::-1], frame.depth[::-1], list(works), frame.ids[::-1], maps, facts)
+    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], maps, dict(facts))
 
 
 def _flat_colors(colors: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.uint32]:

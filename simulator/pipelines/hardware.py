@@ -1,11 +1,10 @@
 """The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.depth_format import DepthFormat
@@ -21,6 +20,7 @@ def hardware(
     width: int,
     height: int,
     simt: Simt,  # noqa: ARG001 - every pipeline is called alike; fixed function has no warps
+    execute: Executor,
     *,
     cull_backfaces: bool = True,
     bits: int = SUBPIXEL_BITS,
@@ -30,7 +30,7 @@ def hardware(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         See ``tilestamp.simulator.pipelines``.
     cull_backfaces : bool
         Leave out what is clockwise on the screen.
@@ -41,9 +41,9 @@ def hardware(
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    frame, work, facts = draw(
-        positions, mesh.triangles, width, height, cull_backfaces=cull_backfaces, bits=bits, depth_format=depth_format
-    )
-    works: list[Any] = [work]
+    frame, _, facts = execute(
+        draw, positions, mesh.triangles, width, height,
+        cull_backfaces=cull_backfaces, bits=bits, depth_format=depth_format,
+    )  # fmt: skip
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
-    return Frame(image[::-1], frame.depth[::-1], works, frame.ids[::-1], facts=facts)
+    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], facts=dict(facts))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines.tiled import check_choices, not_drawn
 from tilestamp.simulator.scenes.scene import Scene
@@ -16,7 +17,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
 
 
 def per_primitive(
@@ -25,6 +26,7 @@ def per_primitive(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     cull_backfaces: bool = False,
     race: bool = True,
@@ -36,7 +38,7 @@ def per_primitive(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         See ``tilestamp.simulator.pipelines``.
     cull_backfaces : bool
         Leave out triangles that face away; the original's basic path does not.
@@ -52,29 +54,27 @@ def per_primitive(
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
-    works = [work for part in zip(shading, assembly, strict=True) for work in part]
-    works += clear(width, height, 0, simt)
-    meant, raced, raster = per_primitive_raster(
-        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces,
+    vertices, drawable = execute(shaded_primitives, mesh, matrix, width, height, simt, parts).outputs
+    execute(clear, width, height, 0, simt)
+    meant, raced = execute(
+        per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces,
         textured=bool((mesh.texture_ids >= 0).any()),
-    )  # fmt: skip
-    works.append(raster)
+    ).outputs  # fmt: skip
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     wrong = raced.triangles != meant.triangles
     visible = Visible(raced.triangles, meant.depth) if race else meant
     fragments = interpolate(mesh, vertices, visible, perspective=perspective)
     light = np.ones((height, width), np.float32)
     if ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
-        works.append(occlusion)
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
     waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
-    image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
+    image = execute(
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter
+    ).outputs
     return Frame(
         image,
         meant.depth,
-        works + finish,
+        execute.works,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
         maps={"race": wrong.astype(np.int64), "pixels wrong by the race": wrong.astype(np.int64)},
         facts={

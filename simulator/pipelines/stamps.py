@@ -5,6 +5,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygon_options import frame_of
 from tilestamp.simulator.scenes.scene import Scene
@@ -21,6 +22,7 @@ def stamps(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     stamp: int | tuple[int, int] = 8,
     touch: Touch = "box",
@@ -34,7 +36,7 @@ def stamps(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         As for every pipeline.
     stamp : int or (int, int)
         Width and height of a stamp in pixels.
@@ -54,5 +56,5 @@ def stamps(
     shape = stamp_shape(stamp, touch, coarse)
     samples = new_samples(width, height, sample_positions(spp, positions))
     polygons = micropolygons(scene, matrix, width, height, edge, triangles)
-    work = draw_stamps(polygons, samples, shape, simt)
-    return frame_of(samples, polygons, [work])
+    execute(draw_stamps, polygons, samples, shape, simt)
+    return frame_of(samples, polygons, execute.works)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import texture_chains
@@ -16,7 +17,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
 from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
 from tilestamp.simulator.work import Work
 
 TILES = range(4, 33)  # pixels on a side; 33x33 threads would be more than a block can have
@@ -28,6 +29,7 @@ def tiled(
     width: int,
     height: int,
     simt: Simt,
+    execute: Executor,
     *,
     tile: int = 8,
     cull_backfaces: bool = True,
@@ -40,7 +42,7 @@ def tiled(
 
     Parameters
     ----------
-    scene, matrix, width, height, simt
+    scene, matrix, width, height, simt, execute
         See ``tilestamp.simulator.pipelines``.
     tile : int
         Pixels on a side of a tile, 4 to 32.
@@ -61,11 +63,10 @@ def tiled(
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
-    works = [work for part in zip(shading, assembly, strict=True) for work in part]
-    works += clear(width, height, tiles, simt)
-    lists, listing, lost = tile_lists(
+    vertices, drawable = execute(shaded_primitives, mesh, matrix, width, height, simt, parts).outputs
+    execute(clear, width, height, tiles, simt)
+    lists, _, listed = execute(
+        tile_lists,
         vertices.screen,
         mesh.triangles,
         drawable,
@@ -76,21 +77,23 @@ def tiled(
         culling=cull_backfaces,
         capacity=capacity,
     )
-    visible, raster = tiled_raster(vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile)
-    works += [*listing, raster]
+    visible, (raster,), _ = execute(
+        tiled_raster, vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile
+    )
     fragments = interpolate(mesh, vertices, visible, perspective=perspective)
     light = np.ones((height, width), np.float32)
     if ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt)
-        works.append(occlusion)
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
     waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
-    image, finish = fragment_shading(mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter)
-    sizes = np.diff(lists.starts)
+    image = execute(
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter
+    ).outputs
+    sizes, lost = np.diff(lists.starts), listed["lost"]
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     return Frame(
         image,
         visible.depth,
-        works + finish,
+        execute.works,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
         maps=_maps(sizes, raster, -(-height // tile)),
         facts={

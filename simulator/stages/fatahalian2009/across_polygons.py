@@ -19,6 +19,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
@@ -56,7 +57,7 @@ class AcrossPolygonsEvent(IntEnum):
     LOAD_BYTES = 12
 
 
-def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> Work:
+def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples``.
 
     Parameters
@@ -69,8 +70,8 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
 
     Returns
     -------
-    Work
-        A row for each chunk of 256 polygons.
+    outputs : Samples
+    works : one, a row for each chunk of 256 polygons
     """
     if packing not in PACKINGS:
         raise TilestampError(f"packing is {', '.join(PACKINGS)}, not {packing}")
@@ -89,7 +90,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
         ),
     )
     shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
-    return Work(
+    work = Work(
         "across_polygons",
         "across_polygons",
         events,
@@ -101,6 +102,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
         streams,
         samples.requests,
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

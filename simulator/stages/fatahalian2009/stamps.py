@@ -18,6 +18,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
@@ -86,7 +87,7 @@ def stamp_shape(stamp: int | tuple[int, int], touch: Touch, coarse: int = 0) -> 
     return StampShape(width, height, touch == "polygon", coarse)
 
 
-def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: Simt) -> Work:
+def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples``.
 
     Parameters
@@ -99,8 +100,8 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
 
     Returns
     -------
-    Work
-        A row for each chunk of 256 polygons.
+    outputs : Samples
+    works : one, a row for each chunk of 256 polygons
     """
     units = -(-len(polygons.patch) // CHUNK)
     table = np.zeros((units, len(StampsEvent)), np.int64)
@@ -112,9 +113,10 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
         Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
     )
     grid = blocks(simt, WARPS)
-    return Work(
+    work = Work(
         "stamps", "stamps", StampsEvent, table, grid, WARPS * simt.warp, 0, "warp_queue", streams, samples.requests
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

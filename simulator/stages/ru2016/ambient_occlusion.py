@@ -14,11 +14,11 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
 from tilestamp.simulator.stages.ru2016.vertex_shading import EyeSpace
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
-from tilestamp.simulator.work import Work
 
 SAMPLES = 64
 NOISE = 4  # pixels on a side of the noise texture
@@ -95,7 +95,7 @@ def _ambient_occlusion(
         _row(w, normals, turns, samples, scales, relative, y, light)
 
 
-def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[NDArray[np.float32], Work]:
+def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> StageResult[NDArray[np.float32]]:
     """Find how much light reaches each pixel.
 
     Parameters
@@ -106,9 +106,9 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[
 
     Returns
     -------
-    light : ndarray, (H, W), float32
-        1 where nothing occludes.
-    work : Work
+    outputs : ndarray, (H, W), float32
+        Share of the light that is left: 1 where nothing occludes.
+    works : one
 
     Raises
     ------
@@ -124,4 +124,5 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> tuple[
     )  # fmt: skip
     loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
     stores = (Access("occlusion", 4, 1),)
-    return light, thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    work = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    return StageResult(light, (work,))

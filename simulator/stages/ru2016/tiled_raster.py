@@ -20,6 +20,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from tilestamp.simulator.work import Work
@@ -156,7 +157,7 @@ def tiled_raster(
     simt: Simt,
     *,
     tile: int,
-) -> tuple[Visible, Work]:
+) -> StageResult[Visible]:
     """Find the nearest triangle of each pixel.
 
     Parameters
@@ -170,8 +171,8 @@ def tiled_raster(
 
     Returns
     -------
-    Visible, Work
-        One row of work a tile.
+    outputs : Visible
+    works : one, a row a tile
     """
     visible = Visible(np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.float32))
     tiles = len(lists.starts) - 1
@@ -193,7 +194,7 @@ def tiled_raster(
         ),
     )
     work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
-    return visible, work
+    return StageResult(visible, (work,))
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:

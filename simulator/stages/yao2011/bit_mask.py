@@ -23,6 +23,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
@@ -69,7 +70,7 @@ class BitMaskEvent(IntEnum):
     LOAD_BYTES = 21
 
 
-def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> Work:
+def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples`` with a mask a patch.
 
     Parameters
@@ -85,8 +86,8 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
 
     Returns
     -------
-    Work
-        A row for each patch that has polygons.
+    outputs : Samples
+    works : one, a row for each patch that has polygons
     """
     if kind not in KINDS:
         raise TilestampError(f"a mask is {', '.join(KINDS)}, not {kind}")
@@ -106,9 +107,10 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
         ),
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
-    return Work(
+    work = Work(
         "bit_mask", "bit_mask", BitMaskEvent, table, grid, block, shared, "warp_queue", streams, samples.requests
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

@@ -18,6 +18,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.depth import NO_DEPTH
@@ -63,7 +64,7 @@ def _fine_rasterizer(
 
 def fine_rasterizer(
     data: TriangleSetupData, tiles: TileQueues, width: int, height: int, simt: Simt, *, early_z: bool, optimized: bool
-) -> tuple[TileFragments, Work]:
+) -> StageResult[TileFragments]:
     """Rasterize all tiles.
 
     Parameters
@@ -80,7 +81,8 @@ def fine_rasterizer(
 
     Returns
     -------
-    TileFragments, Work
+    outputs : TileFragments
+    works : one
     """
     rows, columns = -(-height // TILE), -(-width // TILE)
     out = TileFragments(np.zeros(len(tiles.entries), np.uint64), np.full((height, width), NO_DEPTH, np.uint32))
@@ -105,9 +107,8 @@ def fine_rasterizer(
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
-    return out, Work(
-        "FineRasterizer", kernel, FineRasterizerEvent, table, len(table), 32 * group, shared, streams=streams
-    )
+    work = Work("FineRasterizer", kernel, FineRasterizerEvent, table, len(table), 32 * group, shared, streams=streams)
+    return StageResult(out, (work,))
 
 
 def _by_block(events: NDArray[np.int64], group: int) -> NDArray[np.int64]:

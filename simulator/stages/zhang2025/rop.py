@@ -6,7 +6,7 @@ blends them. The original keeps four in shared memory and does not check for mor
 and the rest is reported, and 0 asks for no limit. Before optimization the four lay in local memory.
 """
 
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import TileFragments
@@ -55,6 +56,14 @@ def _rop(
         )  # fmt: skip
 
 
+class Resolved(NamedTuple):
+    """Pixels, rows from the bottom."""
+
+    target: NDArray[np.float32]  # (H, W, 4)
+    depth: NDArray[np.float32]  # (H, W)
+    winners: NDArray[np.int32]  # (H, W) triangle drawn last, -1 for none
+
+
 def rop(
     data: TriangleSetupData,
     tiles: TileQueues,
@@ -66,7 +75,7 @@ def rop(
     fragment_depth: FragmentDepth = "direct",
     limit: int,
     optimized: bool,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], Work]:
+) -> StageResult[Resolved]:
     """Resolve all pixels.
 
     Parameters
@@ -86,13 +95,8 @@ def rop(
 
     Returns
     -------
-    target : ndarray, (H, W, 4), float32
-        Rows from the bottom.
-    depth : ndarray, (H, W), float32
-    winners : ndarray, (H, W), int32
-        Triangle drawn last, -1 for none.
-    work : Work
-        One row a block.
+    outputs : Resolved
+    works : one, a row a block
     """
     height, width = fragments.depth.shape
     heads, links = np.full((height, width), -1, np.int64), np.full(4 * len(stream.entries), -1, np.int64)
@@ -123,7 +127,8 @@ def rop(
     kernel, shared = ("ROP", 2 * 4 * KEPT * 256) if optimized else ("ROP_before", 0)
     work = Work("ROP", kernel, RopEvent, events, len(events), BLOCK_SIDE**2, shared, streams=streams)
     far = depth > int(DEPTH_STEPS)
-    return target, np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32), winners, work
+    shown = np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32)
+    return StageResult(Resolved(target, shown, winners), (work,))
 
 
 def _add_costs(events: NDArray[np.int64]) -> None:
