@@ -1,6 +1,6 @@
 """The answer to one question: published cells beside ours, figures, notes."""
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class Cell:
     row: str
     column: str
     unit: str
+    _: KW_ONLY
     published: float | str | None
     ours: float | str
     status: Status = "predicted"
@@ -62,7 +63,7 @@ class Figure:
     draw: "Callable[[Path], None]"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Result:
     """What one experiment found."""
 

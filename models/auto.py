@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from tilestamp.models.bounds import Asked, asked_of, longest, roofline
 from tilestamp.models.fidelity_bound import latest_end
-from tilestamp.models.fixed_function import PipeLaunch, pipe_time
-from tilestamp.models.launch import Launch
+from tilestamp.models.fixed_function import pipe_time
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine
 from tilestamp.models.schedule import Loads, loads, played, start_up
 from tilestamp.models.timing import Timing

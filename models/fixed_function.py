@@ -4,33 +4,11 @@ A launch of the pipe says how many items pass each unit, by the unit's name in t
 (``[fixed_function.per_clock]``); units overlap perfectly, and DRAM carries the bytes beside them.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import PipeLaunch
 from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
-
-
-@dataclass(frozen=True)
-class PipeLaunch:
-    """One pass through the fixed-function pipe.
-
-    Parameters
-    ----------
-    stage, kernel : str
-    items : mapping of str to float
-        Items by unit, such as ``{"primitives": 2.4e6, "pixels": 1.9e6}``.
-    streams : tuple of Stream
-        The buffers touched.
-    """
-
-    stage: str
-    kernel: str
-    items: Mapping[str, float] = field(default_factory=dict)
-    streams: tuple[Stream, ...] = ()
 
 
 def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:

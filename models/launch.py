@@ -1,5 +1,6 @@
-"""A launch: what one kernel asks of the machine, by unit of work."""
+"""A launch: what one kernel, or one pass through the fixed-function pipe, asks of the machine."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -36,7 +37,7 @@ class Stream:
     asked_bytes: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Launch:
     """One kernel launch in machine events.
 
@@ -70,3 +71,22 @@ class Launch:
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PipeLaunch:
+    """One pass through the fixed-function pipe.
+
+    Parameters
+    ----------
+    stage, kernel : str
+    items : mapping of str to float
+        Items by unit, such as ``{"primitives": 2.4e6, "pixels": 1.9e6}``.
+    streams : tuple of Stream
+        The buffers touched.
+    """
+
+    stage: str
+    kernel: str
+    items: Mapping[str, float] = field(default_factory=dict)
+    streams: tuple[Stream, ...] = ()

@@ -6,8 +6,8 @@ from typing import Literal
 from tilestamp.models.auto import auto
 from tilestamp.models.bounds import bounds
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.fixed_function import PipeLaunch, pipe_time
-from tilestamp.models.launch import Launch
+from tilestamp.models.fixed_function import pipe_time
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine
 from tilestamp.models.occupancy import residency
 from tilestamp.models.schedule import schedule

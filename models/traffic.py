@@ -12,19 +12,12 @@ if the other ran on the same SM. With S of them and units dealt at random, a seg
 ``S (1 - (1 - 1/S)^k)`` times: hardly less than k for few, at most S for many.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from tilestamp.models.events import MachineEvent
-from tilestamp.models.launch import Launch, Stream
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tilestamp.models.fixed_function import PipeLaunch
-    from tilestamp.models.machine import Machine
+from tilestamp.models.launch import Launch, PipeLaunch, Stream
+from tilestamp.models.machine import Machine
 
 L1_HOLDS_LOADS = 7.0  # compute capability from which L1 keeps global loads by default; before, a cache of 48 KB or none
 
@@ -98,7 +91,7 @@ def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:
     return Stream(f"{name} loads", "load", loads, loads), Stream(f"{name} stores", "store", stores, stores)
 
 
-def _launch_traffic(streams: tuple[Stream, ...], cache: _Cache) -> Traffic:
+def _launch_traffic(streams: tuple[Stream, ...], cache: "_Cache") -> Traffic:
     moved = float(sum(stream.bytes for stream in streams))
     if cache.capacity == 0:
         return Traffic(moved, 0.0, 1.0)

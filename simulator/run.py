@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
 from tilestamp.models.timing import Timing

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.timing import Timing
 from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work

@@ -7,12 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.simulator.sampling.strata import Sample
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Work:
     """What one kernel of a stage did.
 
@@ -65,7 +64,7 @@ class Work:
         return {event.name: totals[event] for event in self.events}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FixedFunctionWork:
     """What passed through the units of a fixed-function pipe.
 
@@ -92,4 +91,4 @@ class FixedFunctionWork:
 
     def launch(self) -> PipeLaunch:
         """The pass, as the machine prices it."""
-        return PipeLaunch(self.stage, self.kernel, dict(self.items), self.streams)
+        return PipeLaunch(stage=self.stage, kernel=self.kernel, items=dict(self.items), streams=self.streams)

@@ -11,8 +11,7 @@ from tilestamp.models.bounds import asked_of, bounds, longest
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.fidelity_bound import latest_end
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import list_machines, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.schedule import loads, played, schedule, start_up
@@ -31,7 +30,16 @@ def launch(units, block=64, dispatch="blocks", grid=None, **events):
     table = np.zeros((units, EVENTS))
     for name, count in events.items():
         table[:, MachineEvent[name]] = count
-    return Launch("stage", "kernel", grid or units, block, 16, 0, table, dispatch)
+    return Launch(
+        stage="stage",
+        kernel="kernel",
+        grid=grid or units,
+        block=block,
+        registers=16,
+        shared_bytes=0,
+        events=table,
+        dispatch=dispatch,
+    )
 
 
 def latest_cycles(what, machine, moved=NOTHING):
@@ -165,7 +173,7 @@ def test_a_smaller_error_never_escalates_less(frames):
 
 
 def test_a_fixed_function_pass_is_exact_at_every_fidelity():
-    got = price([PipeLaunch("hardware", "draw", {"primitives": 1e6})], GTX480, "auto")[0]
+    got = price([PipeLaunch(stage="hardware", kernel="draw", items={"primitives": 1e6})], GTX480, "auto")[0]
     assert got.error_bound == 0.0
     assert got.why == "fixed function"
 

@@ -8,8 +8,7 @@ import pytest
 from tilestamp.models.bounds import bounds
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
-from tilestamp.models.fixed_function import PipeLaunch
-from tilestamp.models.launch import Launch, Stream
+from tilestamp.models.launch import Launch, PipeLaunch, Stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.traffic import Traffic, traffic
@@ -29,7 +28,18 @@ def launch(units=3000, block=64, dispatch="blocks", streams=(), requests=None, *
     table = np.zeros((units, EVENTS))
     for name, count in events.items():
         table[:, MachineEvent[name]] = count
-    return Launch("stage", "kernel", units, block, 16, 0, table, dispatch, tuple(streams), requests)
+    return Launch(
+        stage="stage",
+        kernel="kernel",
+        grid=units,
+        block=block,
+        registers=16,
+        shared_bytes=0,
+        events=table,
+        dispatch=dispatch,
+        streams=tuple(streams),
+        atomic_requests=requests,
+    )
 
 
 def stream(buffer, op, size, footprint=None):
@@ -201,19 +211,19 @@ def test_a_load_that_hits_l2_waits_less():
 
 
 def test_the_slowest_fixed_function_unit_sets_the_time():
-    got = price([PipeLaunch("hardware", "draw", {"primitives": 602e6, "pixels": 602e6})], GTX280)[0]
+    got = price([PipeLaunch(stage="hardware", kernel="draw", items={"primitives": 602e6, "pixels": 602e6})], GTX280)[0]
     assert got.bound == "primitives"
     assert got.milliseconds == pytest.approx(1000, rel=1e-3)
 
 
 def test_an_unknown_fixed_function_unit_is_refused():
     with pytest.raises(TilestampError, match="'triangls'"):
-        price([PipeLaunch("hardware", "draw", {"triangls": 1.0})], GTX280)
+        price([PipeLaunch(stage="hardware", kernel="draw", items={"triangls": 1.0})], GTX280)
 
 
 def test_a_machine_without_fixed_function_refuses_the_pipe():
     with pytest.raises(TilestampError, match="no fixed-function pipe"):
-        price([PipeLaunch("hardware", "draw", {"primitives": 1.0})], load_machine("gt750m"))
+        price([PipeLaunch(stage="hardware", kernel="draw", items={"primitives": 1.0})], load_machine("gt750m"))
 
 
 def test_counts_have_no_time():

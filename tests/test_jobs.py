@@ -14,7 +14,10 @@ from tilestamp.experiments.result import Result
 
 def test_one_job_runs_in_this_process(monkeypatch, tmp_path):
     here = str(os.getpid())
-    monkeypatch.setattr("tilestamp.experiments.jobs.load_experiment", lambda name: lambda _: Result(name, here, "", []))
+    monkeypatch.setattr(
+        "tilestamp.experiments.jobs.load_experiment",
+        lambda name: lambda _: Result(name=name, title=here, source="", cells=[]),
+    )
     results = run_experiments(["a/x", "b/y"], tmp_path, {}, lambda _: None, 1)
     assert [result.name for result in results] == ["a/x", "b/y"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-x", "b-y"]

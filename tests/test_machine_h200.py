@@ -33,7 +33,16 @@ def giga_per_second(addresses):
     events = np.zeros((1, EVENTS))
     events[0, MachineEvent.ATOMIC_REQUESTS] = chunks.sum()
     events[0, MachineEvent.CHAIN_ATOMIC] = 1  # the value returned is awaited
-    launch = Launch("stage", "kernel", 1, 32, 16, 0, events, atomic_requests=chunks)
+    launch = Launch(
+        stage="stage",
+        kernel="kernel",
+        grid=1,
+        block=32,
+        registers=16,
+        shared_bytes=0,
+        events=events,
+        atomic_requests=chunks,
+    )
     terms = bounds(launch, H200, Traffic(0.0, 0.0, 1.0)).term_cycles
     return addresses.size / max(terms["atomic"], terms["queue"]) * H200.clock_hz * 1e-9
 

@@ -61,7 +61,7 @@ def test_lanes_that_are_not_counted_are_refused():
 
 
 def test_a_kernel_without_a_mix_is_refused():
-    work = Work("s", "unknown", Event, np.zeros((1, 3), np.int64), 1, 32)
+    work = Work(stage="s", kernel="unknown", events=Event, table=np.zeros((1, 3), np.int64), grid=1, block=32)
     with pytest.raises(TilestampError, match="unknown"):
         load_mix("micropolygon", "1.3").launch(work, 32)
 

@@ -13,11 +13,17 @@ from tilestamp.models.errors import TilestampError
 
 
 def cell(published: float | str | None = 10.0, ours: float | str = 11.0, status: str = "predicted") -> Cell:
-    return Cell("row", "column", "ms", published, ours, status, 0.05)
+    return Cell("row", "column", "ms", published=published, ours=ours, status=status, aim=0.05)
 
 
 def result(*cells: Cell) -> Result:
-    return Result("paper-table", "A table", "A paper", list(cells), tables={"more": pd.DataFrame({"a": [1]})})
+    return Result(
+        name="paper-table",
+        title="A table",
+        source="A paper",
+        cells=list(cells),
+        tables={"more": pd.DataFrame({"a": [1]})},
+    )
 
 
 def test_the_error_is_relative():

@@ -31,7 +31,16 @@ def launch(units, block=64, dispatch="blocks", grid=None, **events):
     table = np.zeros((units, EVENTS))
     for name, count in events.items():
         table[:, MachineEvent[name]] = count
-    return Launch("stage", "kernel", grid or units, block, 16, 0, table, dispatch)
+    return Launch(
+        stage="stage",
+        kernel="kernel",
+        grid=grid or units,
+        block=block,
+        registers=16,
+        shared_bytes=0,
+        events=table,
+        dispatch=dispatch,
+    )
 
 
 def work_cycles(got):
@@ -80,7 +89,15 @@ def test_sixteen_blocks_take_as_long_as_132():
 def test_one_block_more_than_the_sms_hold_at_a_time_takes_twice_as_long():
     """One block of 20 warps and 48 KB an SM: 15 run together on a GTX 480, the 16th after them."""
     machine = load_machine("gtx480")
-    full = Launch("fine", "k", 15, 640, 48, 48384, np.full((15, EVENTS), 1000.0))
+    full = Launch(
+        stage="fine",
+        kernel="k",
+        grid=15,
+        block=640,
+        registers=48,
+        shared_bytes=48384,
+        events=np.full((15, EVENTS), 1000.0),
+    )
     more = replace(full, grid=16, events=np.full((16, EVENTS), 1000.0))
     ratio = work_cycles(schedule(more, machine, NOTHING)) / work_cycles(schedule(full, machine, NOTHING))
     assert ratio == pytest.approx(2, rel=0.02)

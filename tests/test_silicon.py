@@ -113,14 +113,25 @@ def test_a_cost_is_found_again_from_the_scenes_that_are_left():
 
 def test_each_thread_of_a_block_stores_its_copy_of_the_parameters():
     table = np.zeros((3, len(BinRasterEvent)), np.int64)
-    copied = with_parameter_copy(Work("bin_raster", "binRaster", BinRasterEvent, table, 2, 512))
+    copied = with_parameter_copy(
+        Work(stage="bin_raster", kernel="binRaster", events=BinRasterEvent, table=table, grid=2, block=512)
+    )
     assert copied.table[:, BinRasterEvent.STORE_BYTES].tolist() == [664 * 512, 664 * 512, 0]
     assert copied.streams[-1].bytes == 2 * 664 * 512
 
 
 def _from_l2(machine, asked, footprint=32000):
     stream = Stream("vertices", "load", footprint, footprint, asked_bytes=asked)
-    launch = Launch("s", "k", 1, 64, 16, 0, np.zeros((1, EVENTS)), streams=(stream,))
+    launch = Launch(
+        stage="s",
+        kernel="k",
+        grid=1,
+        block=64,
+        registers=16,
+        shared_bytes=0,
+        events=np.zeros((1, EVENTS)),
+        streams=(stream,),
+    )
     return traffic([launch], load_machine(machine))[0].l2_bytes
 
 

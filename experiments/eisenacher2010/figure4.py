@@ -41,21 +41,22 @@ def run(progress: Progress) -> Result:
             )
     table = pd.DataFrame(rows)
     return Result(
-        "eisenacher2010-figure4",
-        "Figure 4: tile size and zoom, killeroo, 1600x1200, GTX 280",
-        SOURCE,
-        _cells(table),
-        [Figure("zoom", lambda path: _draw(table, path))],
-        _notes(table),
-        stand_in_warnings("killeroo"),
-        {"zoom": table},
+        name="eisenacher2010-figure4",
+        title="Figure 4: tile size and zoom, killeroo, 1600x1200, GTX 280",
+        source=SOURCE,
+        cells=_cells(table),
+        figures=[Figure("zoom", lambda path: _draw(table, path))],
+        notes=_notes(table),
+        warnings=stand_in_warnings("killeroo"),
+        tables={"zoom": table},
     )
 
 
 def _cells(table: "pd.DataFrame") -> list[Cell]:
     """The order at each zoom level, and the times that make it."""
     times = [
-        Cell(f"zoom {row.zoom}", f"{row.tile} tiles", "ms", None, row.ms, "reported") for row in table.itertuples()
+        Cell(f"zoom {row.zoom}", f"{row.tile} tiles", "ms", published=None, ours=row.ms, status="reported")
+        for row in table.itertuples()
     ]
     return [*(_order(table, zoom) for zoom in ZOOMS), *times]
 
@@ -63,7 +64,7 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
 def _order(table: "pd.DataFrame", zoom: int) -> Cell:
     """Tile sizes in the order of their times."""
     times = table[table["zoom"] == zoom].sort_values("ms")
-    return Cell(f"zoom {zoom}", "order in time", "", PUBLISHED_ORDER, " < ".join(times["tile"]))
+    return Cell(f"zoom {zoom}", "order in time", "", published=PUBLISHED_ORDER, ours=" < ".join(times["tile"]))
 
 
 def _notes(table: "pd.DataFrame") -> list[str]:

@@ -41,14 +41,19 @@ def run(progress: Progress) -> Result:
         rows.append({"tile": line.tile_size, "published": line.address_calc_ms, **_why(made)})
     table = pd.DataFrame(rows)
     made_patches = made.frame.facts["subpatches"]
-    cells.insert(0, Cell("all tiles", "sub-patches", "", SUBPATCHES, made_patches, "predicted", COUNT_AIM))
+    cells.insert(
+        0,
+        Cell(
+            "all tiles", "sub-patches", "", published=SUBPATCHES, ours=made_patches, status="predicted", aim=COUNT_AIM
+        ),
+    )
     return Result(
-        "eisenacher2010-table1",
-        "Table 1: bucketing by tile size, killeroo, 1600x1200, bounding box 4, GTX 280",
-        SOURCE,
-        cells,
-        [Figure("address_calculation", lambda path: _draw(table, path))],
-        [
+        name="eisenacher2010-table1",
+        title="Table 1: bucketing by tile size, killeroo, 1600x1200, bounding box 4, GTX 280",
+        source=SOURCE,
+        cells=cells,
+        figures=[Figure("address_calculation", lambda path: _draw(table, path))],
+        notes=[
             (
                 "Why large tiles are slower: fewer requests are sent, but more of them want a lock that is taken; "
                 "the fullest "
@@ -61,8 +66,8 @@ def run(progress: Progress) -> Result:
             ),
             "Patches written at 8-pixel tiles are fitted: the camera's distance was chosen on that count.",
         ],
-        stand_in_warnings("killeroo"),
-        {"conflicts": table},
+        warnings=stand_in_warnings("killeroo"),
+        tables={"conflicts": table},
     )
 
 
@@ -81,10 +86,26 @@ def _cells(line: "pd.Series[float]", made: "Run") -> list[Cell]:
     seen: Status = "fitted" if tile == CAMERA_TILE else "predicted"
     row = f"{tile}x{tile}"
     return [
-        Cell(row, "address calculation", "ms", line.address_calc_ms, stage_ms(made, "bucket_count"), fitted, TIME_AIM),
-        Cell(row, "bucket write", "ms", line.bucket_write_ms, stage_ms(made, "bucket_write"), "predicted", TIME_AIM),
-        Cell(row, "patches written", "", line.patches_written, written, seen, COUNT_AIM),
-        Cell(row, "tiles per patch", "", line.tiles_per_patch, per_patch, seen, COUNT_AIM),
+        Cell(
+            row,
+            "address calculation",
+            "ms",
+            published=line.address_calc_ms,
+            ours=stage_ms(made, "bucket_count"),
+            status=fitted,
+            aim=TIME_AIM,
+        ),
+        Cell(
+            row,
+            "bucket write",
+            "ms",
+            published=line.bucket_write_ms,
+            ours=stage_ms(made, "bucket_write"),
+            status="predicted",
+            aim=TIME_AIM,
+        ),
+        Cell(row, "patches written", "", published=line.patches_written, ours=written, status=seen, aim=COUNT_AIM),
+        Cell(row, "tiles per patch", "", published=line.tiles_per_patch, ours=per_patch, status=seen, aim=COUNT_AIM),
     ]
 
 

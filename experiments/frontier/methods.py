@@ -86,14 +86,14 @@ def run(progress: Progress) -> Result:
     table = _mark_fronts(table)
     doubles = _doubles(progress)
     return Result(
-        "frontier-methods",
-        "What a picture costs: modelled milliseconds of every method against the error of its picture",
-        SOURCE,
-        _cells(table),
-        _figures(table, worst),
-        notes(table, doubles),
-        [],
-        {"methods": table, "double-hits": doubles},
+        name="frontier-methods",
+        title="What a picture costs: modelled milliseconds of every method against the error of its picture",
+        source=SOURCE,
+        cells=_cells(table),
+        figures=_figures(table, worst),
+        notes=notes(table, doubles),
+        warnings=[],
+        tables={"methods": table, "double-hits": doubles},
     )
 
 
@@ -194,8 +194,26 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     for scene, rows in table[table.machine == MACHINES[0]].groupby("scene", sort=False):
         front = rows[rows.front_flip].sort_values("ms")
         for column, point in (("cheapest", front.iloc[0]), ("least FLIP", front.iloc[-1])):
-            cells.append(Cell(f"{scene}: {point.method}", f"{column}, time", "ms", None, float(point.ms), "reported"))
-            cells.append(Cell(f"{scene}: {point.method}", f"{column}, FLIP", "", None, float(point.flip), "reported"))
+            cells.append(
+                Cell(
+                    f"{scene}: {point.method}",
+                    f"{column}, time",
+                    "ms",
+                    published=None,
+                    ours=float(point.ms),
+                    status="reported",
+                )
+            )
+            cells.append(
+                Cell(
+                    f"{scene}: {point.method}",
+                    f"{column}, FLIP",
+                    "",
+                    published=None,
+                    ours=float(point.flip),
+                    status="reported",
+                )
+            )
     return cells
 
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.scenes.clip_space import clip_space_scene
 from tilestamp.simulator.scenes.library import load_scene
-from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.scene import Mesh, Scene, clip_space_scene
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 SHEETS = ((17.0, 1.0, (0.95, 0.55, 0.25)), (-38.0, -1.0, (0.25, 0.55, 0.95)))  # degrees, sign of the wave, colour

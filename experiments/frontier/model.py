@@ -62,17 +62,17 @@ def run(progress: Progress) -> Result:
     theirs = _detailed(table[table.method == FULL].instructions.mean())
     count = table.frame.nunique()
     return Result(
-        "frontier-model",
-        "What accuracy costs: the simulation's own time against the error of its answer",
-        SOURCE,
-        _cells(ours, theirs),
-        [
+        name="frontier-model",
+        title="What accuracy costs: the simulation's own time against the error of its answer",
+        source=SOURCE,
+        cells=_cells(ours, theirs),
+        figures=[
             Figure("against-full-run", lambda path: _draw_full(ours, count, path)),
             Figure("against-published", lambda path: _draw_published(ours, theirs, count, path)),
         ],
-        notes(table, ours, theirs, _beside(ours, theirs)),
-        warnings(),
-        {"frames": table, "methods": ours, "detailed-simulators": theirs},
+        notes=notes(table, ours, theirs, _beside(ours, theirs)),
+        warnings=warnings(),
+        tables={"frames": table, "methods": ours, "detailed-simulators": theirs},
     )
 
 
@@ -152,14 +152,23 @@ def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
         "mean error against known times": ("error_against_known", "%", 100),
     }
     cells = [
-        Cell(row["method"], column, unit, None, scale * row[name], "reported")
+        Cell(row["method"], column, unit, published=None, ours=scale * row[name], status="reported")
         for row in ours.to_dict("records")
         for column, (name, unit, scale) in shown.items()
         if not isnan(row[name])
     ]
     for row in theirs[theirs.seconds.notna()].to_dict("records"):
         speed = str(row["speed_mark"]).partition(":")[0]
-        cells.append(Cell(row["name"], f"the mean frame at its {speed} speed", "s", None, row["seconds"], "reported"))
+        cells.append(
+            Cell(
+                row["name"],
+                f"the mean frame at its {speed} speed",
+                "s",
+                published=None,
+                ours=row["seconds"],
+                status="reported",
+            )
+        )
     return cells
 
 

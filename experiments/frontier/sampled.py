@@ -101,14 +101,14 @@ def run(progress: Progress) -> Result:
         rows += _rows(case, scene)
     table = pd.DataFrame(rows)
     return Result(
-        "frontier-sampled",
-        "What sampling saves: CPU seconds against the error of the frame's numbers",
-        "Full runs of this simulator on this computer",
-        _cells(table),
-        [Figure("seconds-against-error", lambda path: _draw(table, path))],
-        _notes(table),
-        warnings,
-        {"runs": table},
+        name="frontier-sampled",
+        title="What sampling saves: CPU seconds against the error of the frame's numbers",
+        source="Full runs of this simulator on this computer",
+        cells=_cells(table),
+        figures=[Figure("seconds-against-error", lambda path: _draw(table, path))],
+        notes=_notes(table),
+        warnings=warnings,
+        tables={"runs": table},
     )
 
 
@@ -160,9 +160,30 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
         name = f"{row.scene} ({row.primitives:,})"
         asked = f"error {row.error_asked:g}"
         cells += [
-            Cell(name, f"{asked}: seconds", "of full", None, round(row.share_of_full, 3), "reported"),
-            Cell(name, f"{asked}: actual", "%", None, round(100 * row.milliseconds_error, 3), "reported"),
-            Cell(name, f"{asked}: half-width", "%", None, round(100 * row.milliseconds_half_width, 3), "reported"),
+            Cell(
+                name,
+                f"{asked}: seconds",
+                "of full",
+                published=None,
+                ours=round(row.share_of_full, 3),
+                status="reported",
+            ),
+            Cell(
+                name,
+                f"{asked}: actual",
+                "%",
+                published=None,
+                ours=round(100 * row.milliseconds_error, 3),
+                status="reported",
+            ),
+            Cell(
+                name,
+                f"{asked}: half-width",
+                "%",
+                published=None,
+                ours=round(100 * row.milliseconds_half_width, 3),
+                status="reported",
+            ),
         ]
     return cells
 

@@ -44,7 +44,9 @@ def run(progress: Progress) -> Result:
         for stage, ns in nanoseconds(made, triangles).items():
             asked = published_ns()[area, stage]
             status: Status = "fitted" if area in FITTED_AREAS else "predicted"
-            cells.append(Cell(f"{area:g} px", stage, "ns/triangle", asked, ns, status, WORST_AIM))
+            cells.append(
+                Cell(f"{area:g} px", stage, "ns/triangle", published=asked, ours=ns, status=status, aim=WORST_AIM)
+            )
             rows.append(
                 {
                     "area": area,
@@ -58,12 +60,12 @@ def run(progress: Progress) -> Result:
         cells += counter_cells(area, made.frame.facts["counters"], triangles)
     table = pd.DataFrame(rows)
     return Result(
-        "laine2011-figure5",
-        "Figure 5: synthetic sweep, 1024x768, neither depth test nor interpolation, GTX 480",
-        SOURCE,
-        [*_summary(cells), *cells],
-        [Figure("sweep", lambda path: _draw(table, path))],
-        _notes(),
+        name="laine2011-figure5",
+        title="Figure 5: synthetic sweep, 1024x768, neither depth test nor interpolation, GTX 480",
+        source=SOURCE,
+        cells=[*_summary(cells), *cells],
+        figures=[Figure("sweep", lambda path: _draw(table, path))],
+        notes=_notes(),
         tables={"sweep": table},
     )
 
@@ -81,8 +83,8 @@ def counter_cells(area: float, counters: dict[str, float], triangles: int) -> li
             f"{area:g} px",
             row.counter,
             "",
-            float(row.value),
-            round(ours[row.counter], _digits(row.value)),
+            published=float(row.value),
+            ours=round(ours[row.counter], _digits(row.value)),
             aim=COUNTER_AIM,
         )
         for row in reference[reference["area"] == area].itertuples()
@@ -105,7 +107,8 @@ def _summary(cells: list[Cell]) -> list[Cell]:
                 f"worst error (aim {WORST_AIM:.0%})": max(errors),
             }
             summary += [
-                Cell("predicted", f"{stage}: {name}", "%", None, 100 * e, "reported") for name, e in found.items()
+                Cell("predicted", f"{stage}: {name}", "%", published=None, ours=100 * e, status="reported")
+                for name, e in found.items()
             ]
     return summary
 

@@ -42,20 +42,20 @@ def run(progress: Progress) -> Result:
     warnings = [reduced_warning()] if "Buddha" in _scenes() and buddha() != FULL else []
     warnings.append(f"STAND-IN for FairyForest: {FAIRY_STAND_IN}, from a fitted camera")
     return Result(
-        "laine2011-figure6",
-        "Figure 6: cost of a further batch, 1024x768, GTX 480",
-        SOURCE,
-        cells,
-        [Figure(name.lower(), partial(_draw, table[table["scene"] == name], name)) for name in _scenes()],
-        [
+        name="laine2011-figure6",
+        title="Figure 6: cost of a further batch, 1024x768, GTX 480",
+        source=SOURCE,
+        cells=cells,
+        figures=[Figure(name.lower(), partial(_draw, table[table["scene"] == name], name)) for name in _scenes()],
+        notes=[
             "Slope: least squares over 1 to 14 batches, ours and theirs. Theirs is the mean over five cameras.",
             (
                 "A further batch costs a launch of each kernel, idle SMs at its end, queues of its own, and tiles "
                 "read back."
             ),
         ],
-        warnings,
-        {"batches": table},
+        warnings=warnings,
+        tables={"batches": table},
     )
 
 
@@ -88,10 +88,10 @@ def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Ce
                 f"{published_name} ({name})",
                 f"{stage}: a further batch",
                 "us",
-                1e3 * asked,
-                1e3 * found,
-                "reported",
-                AIM,
+                published=1e3 * asked,
+                ours=1e3 * found,
+                status="reported",
+                aim=AIM,
             )
         )
     return cells

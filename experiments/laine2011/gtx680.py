@@ -29,20 +29,31 @@ def run(progress: Progress) -> Result:
         there = made.on(OTHER)
         old, new = nanoseconds(made, triangles), nanoseconds(there, triangles)
         for stage in STAGES:
-            cells.append(Cell(f"{area:g} px", stage, f"ns/triangle, {OTHER}", None, new[stage], "reported"))
-            cells.append(Cell(f"{area:g} px", stage, f"{OTHER} : {MACHINE}", None, new[stage] / old[stage], "reported"))
+            cells.append(
+                Cell(f"{area:g} px", stage, f"ns/triangle, {OTHER}", published=None, ours=new[stage], status="reported")
+            )
+            cells.append(
+                Cell(
+                    f"{area:g} px",
+                    stage,
+                    f"{OTHER} : {MACHINE}",
+                    published=None,
+                    ours=new[stage] / old[stage],
+                    status="reported",
+                )
+            )
             bound = str(there.stages.loc[stage, "bound"])
             rows.append(
                 {"area": area, "stage": stage, "ns": new[stage], "ratio": new[stage] / old[stage], "bound": bound}
             )
     table = pd.DataFrame(rows)
     return Result(
-        "laine2011-gtx680",
-        "The sweep on a GTX 680, by the mixes of the GTX 480",
-        SOURCE,
-        cells,
-        [Figure("ratio", lambda path: _draw(table, path))],
-        [
+        name="laine2011-gtx680",
+        title="The sweep on a GTX 680, by the mixes of the GTX 480",
+        source=SOURCE,
+        cells=cells,
+        figures=[Figure("ratio", lambda path: _draw(table, path))],
+        notes=[
             (
                 "A prediction without a measured cell here: nothing is fitted to a GTX 680, and its machine file is "
                 "made of published parameters. Only the machine file differs; code compiled for 3.0 would differ too."

@@ -29,7 +29,17 @@ def run(progress: Progress) -> Result:
         row = table.loc[scene.name]
         setup = scene.triangles * SUBTRIANGLE_BYTES["1.1"] / 2**20
         status: Status = "fitted" if scene.name in DERIVED else "predicted"
-        cells.append(Cell(scene.name, "setup data", "MB", float(row["triangle_setup_MB"]), setup, status, SETUP_AIM))
+        cells.append(
+            Cell(
+                scene.name,
+                "setup data",
+                "MB",
+                published=float(row["triangle_setup_MB"]),
+                ours=setup,
+                status=status,
+                aim=SETUP_AIM,
+            )
+        )
         if scene.name in drawn:
             progress(f"laine2011/memory: {scene.name}")
             used = draw(scene.name, "cudaraster", WIDTH, HEIGHT).frame.facts["memory_mb"]
@@ -37,12 +47,12 @@ def run(progress: Progress) -> Result:
                 queue_cell(scene.name, queue, float(row[column]), used[queue]) for queue, column in QUEUES.items()
             ]
     return Result(
-        "laine2011-memory",
-        "Slides: memory in use, CudaRaster, 1024x768",
-        SOURCE,
-        cells,
-        [Figure("memory", lambda path: _draw(cells, path))],
-        [
+        name="laine2011-memory",
+        title="Slides: memory in use, CudaRaster, 1024x768",
+        source=SOURCE,
+        cells=cells,
+        figures=[Figure("memory", lambda path: _draw(cells, path))],
+        notes=[
             "The triangles of San Miguel and Juarez were derived from their setup data, so those two cells are fitted.",
             "How far generated triangles are out of order was chosen on the bin queues of Buddha alone.",
             (
@@ -50,7 +60,7 @@ def run(progress: Progress) -> Result:
                 "SM; each stream of each bin keeps an open segment of 2 KB at the end of each batch."
             ),
         ],
-        [warning()],
+        warnings=[warning()],
     )
 
 
@@ -58,7 +68,7 @@ def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:
     """One queue; its aim is a factor, so that too little is judged like too much."""
     aim = QUEUE_FACTOR - 1.0 if ours > asked else 1.0 - 1.0 / QUEUE_FACTOR
     status: Status = "fitted" if (scene, queue) == FITTED_QUEUE else "predicted"
-    return Cell(scene, queue, "MB", asked, ours, status, aim)
+    return Cell(scene, queue, "MB", published=asked, ours=ours, status=status, aim=aim)
 
 
 def _draw(cells: list[Cell], path: "Path") -> None:

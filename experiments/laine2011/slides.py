@@ -40,23 +40,23 @@ def run(progress: Progress) -> Result:
         cells += statistic_cells(scene)
     table = pd.DataFrame(rows)
     return Result(
-        "laine2011-slides",
-        "Slides: hardware (HW), CudaRaster (SW) and FreePipe (FP), depth test and colour, GTX 480",
-        SOURCE,
-        cells,
-        [
+        name="laine2011-slides",
+        title="Slides: hardware (HW), CudaRaster (SW) and FreePipe (FP), depth test and colour, GTX 480",
+        source=SOURCE,
+        cells=cells,
+        figures=[
             Figure("pipelines", lambda path: _draw(table, PIPELINES[:2], path)),
             Figure("freepipe", lambda path: _draw(table, PIPELINES[2:], path)),
         ],
-        [
+        notes=[
             (
                 "Nothing is fitted to these cells. SW:HW and FP:SW are ratios of times, above 1 where the first is "
                 "slower."
             ),
             f"1024x768 without San Miguel, unless {VARIABLE}=all. No triangle count is scaled down.",
         ],
-        [warning()],
-        {"times": table},
+        warnings=[warning()],
+        tables={"times": table},
     )
 
 
@@ -68,9 +68,14 @@ def published_ms(scene: str, width: int, height: int) -> dict[str, float]:
 
 def time_cells(row: str, ours: dict[str, float], asked: dict[str, float]) -> list[Cell]:
     """Times, and the two ratios of the slides."""
-    cells = [Cell(row, pipeline, "ms", asked[pipeline], ours[pipeline], "reported") for pipeline in PIPELINES]
+    cells = [
+        Cell(row, pipeline, "ms", published=asked[pipeline], ours=ours[pipeline], status="reported")
+        for pipeline in PIPELINES
+    ]
     for name, slow, fast in (("SW:HW", "cudaraster", "hardware"), ("FP:SW", "freepipe", "cudaraster")):
-        cells.append(Cell(row, name, "", asked[slow] / asked[fast], ours[slow] / ours[fast], "reported"))
+        cells.append(
+            Cell(row, name, "", published=asked[slow] / asked[fast], ours=ours[slow] / ours[fast], status="reported")
+        )
     return cells
 
 
@@ -83,8 +88,15 @@ def statistic_cells(scene: "Statistics") -> list[Cell]:
     share = 100.0 * visible / scene.triangles
     pixels = fragments / scene.triangles  # both faces, and all of them drawn
     return [
-        Cell(scene.name, "visible triangles", "%", None if scene.assumed else scene.visible, share, "reported"),
-        Cell(scene.name, "pixels a triangle", "", scene.pixels, pixels, "reported"),
+        Cell(
+            scene.name,
+            "visible triangles",
+            "%",
+            published=None if scene.assumed else scene.visible,
+            ours=share,
+            status="reported",
+        ),
+        Cell(scene.name, "pixels a triangle", "", published=scene.pixels, ours=pixels, status="reported"),
     ]
 
 

@@ -45,18 +45,26 @@ def run(progress: Progress) -> Result:
     ]
     if name is None:
         warning = f"neither {FULL} nor {REDUCED} is on the scene search path (TILESTAMP_SCENES): nothing was drawn"
-        return Result("laine2011-table3", "Table 3: Buddha", SOURCE, [], [], notes, [warning])
+        return Result(
+            name="laine2011-table3",
+            title="Table 3: Buddha",
+            source=SOURCE,
+            cells=[],
+            figures=[],
+            notes=notes,
+            warnings=[warning],
+        )
     progress(f"laine2011/table3: {name}")
     made = simulate(load_buddha(name), "cudaraster", MACHINE, width=WIDTH, height=HEIGHT, camera=CAMERA)
     cells = counter_cells(made, "predicted" if name == FULL else "reported")
     return Result(
-        "laine2011-table3",
-        f"Table 3: {name}, camera 0, 1024x768, GTX 480",
-        SOURCE,
-        cells,
-        [Figure("counters", lambda path: _draw(cells, path))],
-        notes,
-        [] if name == FULL else [reduced_warning()],
+        name="laine2011-table3",
+        title=f"Table 3: {name}, camera 0, 1024x768, GTX 480",
+        source=SOURCE,
+        cells=cells,
+        figures=[Figure("counters", lambda path: _draw(cells, path))],
+        notes=notes,
+        warnings=[] if name == FULL else [reduced_warning()],
     )
 
 
@@ -93,16 +101,54 @@ def counter_cells(made: "Run", status: Status) -> list[Cell]:
     cells = []
     for stage, kernel in KERNELS.items():
         asked = float(rows.loc[rows["key"] == kernel, "value"].iloc[0])
-        cells.append(Cell(kernel, "time", "ms", asked, float(made.stages.loc[stage, "milliseconds"]), status, TIME_AIM))
+        cells.append(
+            Cell(
+                kernel,
+                "time",
+                "ms",
+                published=asked,
+                ours=float(made.stages.loc[stage, "milliseconds"]),
+                status=status,
+                aim=TIME_AIM,
+            )
+        )
     for name, buffer in SEGMENTS.items():
         asked = rows[rows["key"] == name].set_index("column")["value"]
-        cells.append(Cell(name, "count", "", float(asked["count"]), float(facts[name]), status, COUNTER_AIM))
-        cells.append(Cell(name, "memory", "MB", float(asked["MB"]), facts["memory_mb"][buffer], status, COUNTER_AIM))
+        cells.append(
+            Cell(
+                name,
+                "count",
+                "",
+                published=float(asked["count"]),
+                ours=float(facts[name]),
+                status=status,
+                aim=COUNTER_AIM,
+            )
+        )
+        cells.append(
+            Cell(
+                name,
+                "memory",
+                "MB",
+                published=float(asked["MB"]),
+                ours=facts["memory_mb"][buffer],
+                status=status,
+                aim=COUNTER_AIM,
+            )
+        )
     for row in rows[rows["column"].str.startswith("counters")].itertuples():
         unit = "%" if row.column.endswith("percent") else ""
         stage, _, counter = row.key.partition(" / ")
         cells.append(
-            Cell(stage, counter, unit, float(row.value), float(facts["counters"][row.key]), status, COUNTER_AIM)
+            Cell(
+                stage,
+                counter,
+                unit,
+                published=float(row.value),
+                ours=float(facts["counters"][row.key]),
+                status=status,
+                aim=COUNTER_AIM,
+            )
         )
     return cells
 

@@ -30,7 +30,14 @@ def run(progress: Callable[[str], None]) -> Result:
             continue
         difference = frames[0].milliseconds - frames[1].milliseconds
         cells.append(
-            Cell(name, "bilinear - nearest", "ms", float(row["on_ms"]) - float(row["off_ms"]), difference, aim=1.0)
+            Cell(
+                name,
+                "bilinear - nearest",
+                "ms",
+                published=float(row["on_ms"]) - float(row["off_ms"]),
+                ours=difference,
+                aim=1.0,
+            )
         )
     occlusion = table[table.feature == "ssao"]
     speed = _speed(occlusion)
@@ -44,12 +51,22 @@ def run(progress: Callable[[str], None]) -> Result:
             continue
         costs.append(float(frame.stages.milliseconds.to_dict()["ambient_occlusion"]))
         asked = float(row["on_ms"]) - float(row["off_ms"])
-        cells.append(Cell(name, "ssao: on - off", "ms", asked, costs[-1] / speed, aim=0.5))
+        cells.append(Cell(name, "ssao: on - off", "ms", published=asked, ours=costs[-1] / speed, aim=0.5))
     if costs:
         same = max(costs) - min(costs) < SAME * max(costs)
-        cells.append(Cell("all models", "ssao: cost depends on the scene", "", "no", "no" if same else "yes"))
+        cells.append(
+            Cell("all models", "ssao: cost depends on the scene", "", published="no", ours="no" if same else "yes")
+        )
     notes = _notes(costs, speed)
-    return Result("ru2016-features", "Filtering and ambient occlusion", SOURCE, cells, [], notes, missing(absent))
+    return Result(
+        name="ru2016-features",
+        title="Filtering and ambient occlusion",
+        source=SOURCE,
+        cells=cells,
+        figures=[],
+        notes=notes,
+        warnings=missing(absent),
+    )
 
 
 def _tiled(name: str, **options: Any) -> Run | None:

@@ -51,8 +51,8 @@ def run(progress: Callable[[str], None]) -> Result:
     absent = [name for name, frames in runs.items() if not frames]
     cells = [
         Cell(
-            name, column.removesuffix("_ms"), "ms", float(table[column][name]), frame_ms(frame),
-            "fitted" if (name, column) in FITTED else "predicted", aim=AIM,
+            name, column.removesuffix("_ms"), "ms", published=float(table[column][name]), ours=frame_ms(frame),
+            status="fitted" if (name, column) in FITTED else "predicted", aim=AIM,
         )
         for name, frames in runs.items()
         for column, frame in frames.items()
@@ -61,8 +61,16 @@ def run(progress: Callable[[str], None]) -> Result:
     progress("the other view")
     tables = {"views": _views(), "breakdown": _breakdown(runs)}
     notes = [*_notes(runs, tables["breakdown"]), _view_note(cells, tables["views"], table)]
-    return Result("ru2016-models", "Tiles against primitives", SOURCE, cells, _figures(cells), notes, missing(absent),
-                  tables)  # fmt: skip
+    return Result(
+        name="ru2016-models",
+        title="Tiles against primitives",
+        source=SOURCE,
+        cells=cells,
+        figures=_figures(cells),
+        notes=notes,
+        warnings=missing(absent),
+        tables=tables,
+    )
 
 
 def _winner(name: str, asked: "pd.Series[float]", frames: dict[str, Run]) -> Cell:
@@ -71,7 +79,7 @@ def _winner(name: str, asked: "pd.Series[float]", frames: dict[str, Run]) -> Cel
     his = "tie" if tie else "tiles" if asked["tile_ms"] < asked["per_primitive_ms"] else "primitives"
     ours = "tiles" if frame_ms(frames["tile_ms"]) < frame_ms(frames["per_primitive_ms"]) else "primitives"
     status: Status = "reported" if tie else "fitted" if name in SHARE_OF_WINDOW else "predicted"
-    return Cell(name, "faster", "", his, ours, status)
+    return Cell(name, "faster", "", published=his, ours=ours, status=status)
 
 
 def _notes(runs: dict[str, dict[str, Run]], breakdown: pd.DataFrame) -> list[str]:

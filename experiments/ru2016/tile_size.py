@@ -41,15 +41,32 @@ def run(progress: Callable[[str], None]) -> Result:
     asked = dict(zip(table.tile_size, table.ms, strict=True))
     for tile, frame in times.items():
         status: Status = "fitted" if tile == FITTED_TILE else "predicted"
-        rows.append(Cell(f"{tile}x{tile}", "time", "ms", float(asked[tile]), frame_ms(frame), status, aim=0.2))
+        rows.append(
+            Cell(
+                f"{tile}x{tile}",
+                "time",
+                "ms",
+                published=float(asked[tile]),
+                ours=frame_ms(frame),
+                status=status,
+                aim=0.2,
+            )
+        )
     if rows:
         order = " < ".join(str(tile) for tile in sorted(times, key=lambda tile: frame_ms(times[tile])))
-        cells.append(Cell("all", "order in time", "", "8 < 4 < 16 < 32", order))
+        cells.append(Cell("all", "order in time", "", published="8 < 4 < 16 < 32", ours=order))
     runs = pd.DataFrame([_row(tile, frame) for tile, frame in times.items()])
     warnings = [] if times else missing([MODEL])
     notes = _notes(times) if times else []
     return Result(
-        "ru2016-tile_size", "Tile size", SOURCE, cells + rows, _figures(rows), notes, warnings, {"runs": runs}
+        name="ru2016-tile_size",
+        title="Tile size",
+        source=SOURCE,
+        cells=cells + rows,
+        figures=_figures(rows),
+        notes=notes,
+        warnings=warnings,
+        tables={"runs": runs},
     )
 
 
@@ -61,8 +78,14 @@ def _occupancy(table: pd.DataFrame) -> list[Cell]:
         tile = int(row["tile_size"])
         held = residency(machine, tile * tile, REGISTERS, 0)
         label = f"{tile}x{tile}"
-        cells.append(Cell(label, "occupancy", "%", float(row["occupancy_percent"]), 100.0 * held.occupancy, aim=0.0))
-        cells.append(Cell(label, "resident blocks", "blocks", float(row["resident_blocks"]), held.blocks, aim=0.0))
+        cells.append(
+            Cell(
+                label, "occupancy", "%", published=float(row["occupancy_percent"]), ours=100.0 * held.occupancy, aim=0.0
+            )
+        )
+        cells.append(
+            Cell(label, "resident blocks", "blocks", published=float(row["resident_blocks"]), ours=held.blocks, aim=0.0)
+        )
     return cells
 
 

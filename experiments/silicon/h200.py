@@ -56,7 +56,14 @@ def run(progress: Callable[[str], None]) -> Result:
         "fastest-tile": tiles,
     }
     return Result(
-        "silicon-h200", "H200, model against machine", SOURCE, _cells(table), _figures(table), notes, [], tables
+        name="silicon-h200",
+        title="H200, model against machine",
+        source=SOURCE,
+        cells=_cells(table),
+        figures=_figures(table),
+        notes=notes,
+        warnings=[],
+        tables=tables,
     )
 
 
@@ -90,7 +97,9 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     for r in shown.itertuples():
         label = f"{r.scene} {r.W}" + (f" tile {r.tile}" if r.tile else "") + (f" spp {r.spp}" if r.spp else "")
         unit = "us" if r.quantity == TIME else ""
-        cells.append(Cell(label, f"{r.kernel} {r.quantity}", unit, r.measured, r.ours, r.status, aim=r.aim))
+        cells.append(
+            Cell(label, f"{r.kernel} {r.quantity}", unit, published=r.measured, ours=r.ours, status=r.status, aim=r.aim)
+        )
     return cells
 
 

@@ -48,14 +48,14 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     tables = {"all": table, "kernels": kernels, "scenes": by_scene(table), "fastest-tile": tiles}
     return Result(
-        "silicon-unseen",
-        "H200, scenes that nothing was fitted to",
-        SOURCE,
-        cells_of(table),
-        [],
-        notes,
-        left_out,
-        tables,
+        name="silicon-unseen",
+        title="H200, scenes that nothing was fitted to",
+        source=SOURCE,
+        cells=cells_of(table),
+        figures=[],
+        notes=notes,
+        warnings=left_out,
+        tables=tables,
     )
 
 
@@ -84,5 +84,5 @@ def cells_of(table: "pd.DataFrame") -> list[Cell]:
     for r in shown.itertuples():
         label = f"{r.scene} {r.W}" + (f" tile {r.tile}" if r.tile else "") + (f" spp {r.spp}" if r.spp else "")
         unit = "us" if r.quantity == TIME else ""
-        cells.append(Cell(label, f"{r.kernel} {r.quantity}", unit, r.measured, r.ours, aim=r.aim))
+        cells.append(Cell(label, f"{r.kernel} {r.quantity}", unit, published=r.measured, ours=r.ours, aim=r.aim))
     return cells

@@ -140,7 +140,16 @@ def atlas_result(
     sentences = [_sentence(boundary) for boundary in boundaries if boundary.breaks is not None]
     tables = {"boundaries": boundary_table(boundaries), **(tables or {})}
     source = "Stability atlas: no published cells; boundaries by bisection on our own runs"
-    return Result(name, title, source, cells, list(figures), [*sentences, *_unbroken(boundaries), *notes], [], tables)
+    return Result(
+        name=name,
+        title=title,
+        source=source,
+        cells=cells,
+        figures=list(figures),
+        notes=[*sentences, *_unbroken(boundaries), *notes],
+        warnings=[],
+        tables=tables,
+    )
 
 
 def _cells(boundary: Boundary) -> list[Cell]:
@@ -149,7 +158,14 @@ def _cells(boundary: Boundary) -> list[Cell]:
     breaks: float | str = "none tried" if boundary.breaks is None else boundary.breaks
     columns = (("holds at", holds), ("breaks at", breaks))
     return [
-        Cell(boundary.method, f"{boundary.parameter} {column}", boundary.unit, None, value, "reported")
+        Cell(
+            boundary.method,
+            f"{boundary.parameter} {column}",
+            boundary.unit,
+            published=None,
+            ours=value,
+            status="reported",
+        )
         for column, value in columns
     ]
 

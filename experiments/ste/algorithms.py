@@ -60,16 +60,25 @@ def run(progress: Callable[[str], None]) -> Result:
             f"{r['machine']}, {r['area']:g} px",
             f"{r['algorithm']} ({r['bound']})",
             "ns a polygon",
-            None,
-            r["ns"],
-            "reported",
+            published=None,
+            ours=r["ns"],
+            status="reported",
         )
         for r in rows
     ]
     figures = [_figure(table, machine) for machine in MACHINES]
     notes = [*_winners(table), "All mixes are assumed: counted by hand on the kernels' CUDA form."]
     source = "No published times: modelled"
-    return Result("ste/algorithms", "Which algorithm wins", source, cells, figures, notes, [], {"runs": table})
+    return Result(
+        name="ste/algorithms",
+        title="Which algorithm wins",
+        source=source,
+        cells=cells,
+        figures=figures,
+        notes=notes,
+        warnings=[],
+        tables={"runs": table},
+    )
 
 
 def patches_of_squares(area: float, seed: int = 21) -> Micropolygons:

@@ -43,7 +43,7 @@ def run(progress: Callable[[str], None]) -> Result:
         rows += [{"area": area, "aspect": aspect, **_measure(area, aspect)} for aspect in ASPECTS]
     table = pd.DataFrame(rows)
     cells = [
-        Cell(f"{row['area']:g} px, {row['aspect']}:1", name, unit, None, row[column], "reported")
+        Cell(f"{row['area']:g} px, {row['aspect']}:1", name, unit, published=None, ours=row[column], status="reported")
         for row in rows
         for column, name, unit in COLUMNS
     ]
@@ -55,7 +55,16 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     figure = Figure("aspect", lambda path: _plot(table, path))
     source = "Yao et al. 2012, section 3: the gain is limited for long or narrow triangles"
-    return Result("ste/aspect", "The mask on narrow polygons", source, cells, [figure], notes, [], {"runs": table})
+    return Result(
+        name="ste/aspect",
+        title="The mask on narrow polygons",
+        source=source,
+        cells=cells,
+        figures=[figure],
+        notes=notes,
+        warnings=[],
+        tables={"runs": table},
+    )
 
 
 def _measure(area: float, aspect: int) -> dict[str, float]:

@@ -59,7 +59,14 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     warnings = [model.warning for model in models.values() if model.warning]
     return Result(
-        "ste/bit_mask", "Bit mask filtering", SOURCE, _cells(table), figures, _notes(table), warnings, {"runs": table}
+        name="ste/bit_mask",
+        title="Bit mask filtering",
+        source=SOURCE,
+        cells=_cells(table),
+        figures=figures,
+        notes=_notes(table),
+        warnings=warnings,
+        tables={"runs": table},
     )
 
 
@@ -94,15 +101,27 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     under = [row for row in rows if row["model"] == "bigguy" and row["ste"] < PAPER_STE]
     for near in sorted(under, key=lambda row: -row["ste"])[:1]:
         place = f"bigguy level {near['level']}, height {near['height']}"
-        cells.append(Cell(place, "STE without the mask (published: below 3)", "%", None, near["ste"], "reported"))
-        cells.append(Cell(place, "gain", "x", PAPER_GAIN["bigguy"], near["gain"], aim=0.1))
+        cells.append(
+            Cell(
+                place,
+                "STE without the mask (published: below 3)",
+                "%",
+                published=None,
+                ours=near["ste"],
+                status="reported",
+            )
+        )
+        cells.append(Cell(place, "gain", "x", published=PAPER_GAIN["bigguy"], ours=near["gain"], aim=0.1))
     for row in rows:
         if row["model"] == "cube" and row["level"] == 7:
             place = f"cube 7 rounds, height {row['height']}"
-            cells.append(Cell(place, "gain", "x", PAPER_GAIN["cube"], row["gain"], aim=0.1))
+            cells.append(Cell(place, "gain", "x", published=PAPER_GAIN["cube"], ours=row["gain"], aim=0.1))
     for row in rows:
         place = f"{row['model']} level {row['level']}, height {row['height']}"
-        cells += [Cell(place, name, unit, None, float(row[column]), "reported") for column, name, unit in REPORTED]
+        cells += [
+            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported")
+            for column, name, unit in REPORTED
+        ]
     return cells
 
 

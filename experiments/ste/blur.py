@@ -48,20 +48,41 @@ def run(progress: Callable[[str], None]) -> Result:
             rows += _measure(way, radius)
     table = pd.DataFrame(rows)
     cells = [
-        Cell(f"{r['way']:g} px, circle {r['radius']:g} px", f"{r['algorithm']}, STE", "%", None, r["ste"], "reported")
+        Cell(
+            f"{r['way']:g} px, circle {r['radius']:g} px",
+            f"{r['algorithm']}, STE",
+            "%",
+            published=None,
+            ours=r["ste"],
+            status="reported",
+        )
         for r in rows
     ]
     cells += [
-        Cell(f"{r['way']:g} px, circle {r['radius']:g} px", f"{r['algorithm']}, cost", "operations a polygon", None,
-             r["cost"], "reported") for r in rows
-    ]  # fmt: skip
+        Cell(
+            f"{r['way']:g} px, circle {r['radius']:g} px",
+            f"{r['algorithm']}, cost",
+            "operations a polygon",
+            published=None,
+            ours=r["cost"],
+            status="reported",
+        )
+        for r in rows
+    ]
     ways = [f"interleaved {tile**2 * SPP}" for tile in TILES]
     notes = [_crossing(table[table.radius == radius], radius, name) for radius in RADII for name in ways]
     notes.append("Interval and interleaving draw brute force's picture on their own samples in every run checked.")
     figures = [Figure("cost", lambda path: _plot(table, path)), Figure("tests", _maps)]
     source = "Fatahalian et al. 2009 (abstract): interleaving beats intervals at moderate defocus or high motion"
     return Result(
-        "ste/blur", "Blur: intervals against interleaving", source, cells, figures, notes, [], {"runs": table}
+        name="ste/blur",
+        title="Blur: intervals against interleaving",
+        source=source,
+        cells=cells,
+        figures=figures,
+        notes=notes,
+        warnings=[],
+        tables={"runs": table},
     )
 
 

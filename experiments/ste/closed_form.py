@@ -59,8 +59,8 @@ def run(progress: Callable[[str], None]) -> Result:
             f"{r['polygon']} {r['area']:g}",
             f"{r['stamp']}x{r['stamp']} {r['touch']}",
             "% STE",
-            r["closed_form"],
-            r["ste"],
+            published=r["closed_form"],
+            ours=r["ste"],
         )
         for r in rows
     ]
@@ -72,7 +72,16 @@ def run(progress: Callable[[str], None]) -> Result:
     shown = table.query("polygon == 'square' and touch == 'box'").assign(stamp=lambda t: t.stamp.map("{0}x{0}".format))
     figure = Figure("ste", lambda path: _plot(shown, path))
     source = "Closed form of published/facts.md, section 1.2; definitions of Fatahalian et al. 2009"
-    return Result("ste/closed_form", "STE by stamp and area", source, cells, [figure], notes, [], {"intervals": table})
+    return Result(
+        name="ste/closed_form",
+        title="STE by stamp and area",
+        source=source,
+        cells=cells,
+        figures=[figure],
+        notes=notes,
+        warnings=[],
+        tables={"intervals": table},
+    )
 
 
 def _plot(table: pd.DataFrame, path: Any) -> None:

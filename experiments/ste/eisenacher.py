@@ -35,7 +35,16 @@ def run(progress: Callable[[str], None]) -> Result:
     """Sweep the area, then measure the scenes."""
     progress("8x8 stamp over polygon area")
     sweep = pd.DataFrame([_swept(area) for area in AREAS])
-    cells = [Cell("square, closed form", "area at 2 %", "pixels", None, _area_at(QUOTED / 100), "reported")]
+    cells = [
+        Cell(
+            "square, closed form",
+            "area at 2 %",
+            "pixels",
+            published=None,
+            ours=_area_at(QUOTED / 100),
+            status="reported",
+        )
+    ]
     rows, warnings = [], []
     for name in SCENES:
         progress(f"{name} at {SIZE[0]}x{SIZE[1]}")
@@ -45,7 +54,7 @@ def run(progress: Callable[[str], None]) -> Result:
             warnings.append(f"{name} is left out: {error}")
     for row in rows:
         place = f"{row['scene']}, boxes under {row['bound']:g} px ({row['area']:.2f} px a quad)"
-        cells.append(Cell(place, "STE of the 8x8 stamp", "%", QUOTED, row["ste"], "reported"))
+        cells.append(Cell(place, "STE of the 8x8 stamp", "%", published=QUOTED, ours=row["ste"], status="reported"))
     notes = [
         f"A square of {_area_at(QUOTED / 100):.2f} pixels gives 2 % with 8x8-pixel stamps (closed form).",
         "The quoted 2 % is a prediction in the literature, so no error against it is averaged.",
@@ -54,7 +63,16 @@ def run(progress: Callable[[str], None]) -> Result:
     figure = Figure("area", lambda path: _plot(sweep, path))
     source = "Eisenacher & Loop 2010, introduction and section 6"
     tables = {"sweep": sweep, "scenes": pd.DataFrame(rows)}
-    return Result("ste/eisenacher", "The 8x8 stamp on micropolygons", source, cells, [figure], notes, warnings, tables)
+    return Result(
+        name="ste/eisenacher",
+        title="The 8x8 stamp on micropolygons",
+        source=source,
+        cells=cells,
+        figures=[figure],
+        notes=notes,
+        warnings=warnings,
+        tables=tables,
+    )
 
 
 def _swept(area: float) -> dict[str, float]:

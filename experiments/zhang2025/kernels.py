@@ -28,7 +28,15 @@ def run(progress: Callable[[str], None]) -> Result:
     notes = _notes()
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
-        return Result("zhang2025-kernels", "Ten kernels", SOURCE, [], [], notes, [warning])
+        return Result(
+            name="zhang2025-kernels",
+            title="Ten kernels",
+            source=SOURCE,
+            cells=[],
+            figures=[],
+            notes=notes,
+            warnings=[warning],
+        )
     cells: list[Cell] = []
     errors: dict[str, float] = {}
     table = published("kernels").set_index("kernel")
@@ -41,10 +49,12 @@ def run(progress: Callable[[str], None]) -> Result:
             times = {kernel: timing.milliseconds * 1e3 for kernel, timing in timings.items()}
             for kernel, asked in table[column].items():
                 name = f"{machine} {column.removesuffix('_us')}"
-                cells.append(Cell(str(kernel), name, "us", float(asked), times[str(kernel)], aim=AIM))
+                cells.append(Cell(str(kernel), name, "us", published=float(asked), ours=times[str(kernel)], aim=AIM))
                 ratios.append(times[str(kernel)] / float(asked))
             total, ours = float(table[column].sum()), sum(times.values())
-            cells.append(Cell("sum", f"{machine} {column.removesuffix('_us')}", "us", total, ours, aim=0.3))
+            cells.append(
+                Cell("sum", f"{machine} {column.removesuffix('_us')}", "us", published=total, ours=ours, aim=0.3)
+            )
         if machine == CANDIDATES[0]:
             cells += _traffic(table, timings)
             cells += _saved(cells, machine)
@@ -53,7 +63,14 @@ def run(progress: Callable[[str], None]) -> Result:
     best = min(errors, key=lambda name: errors[name])
     stated = ", ".join(f"{name} a factor {error:.2f}" for name, error in errors.items())
     notes.append(f"Mean miss of a kernel (geometric): {stated}. {best} fits better.")
-    return Result("zhang2025-kernels", "Ten kernels before and after", SOURCE, cells, [_figure(cells)], notes)
+    return Result(
+        name="zhang2025-kernels",
+        title="Ten kernels before and after",
+        source=SOURCE,
+        cells=cells,
+        figures=[_figure(cells)],
+        notes=notes,
+    )
 
 
 def _notes() -> list[str]:
@@ -101,7 +118,13 @@ def _saved(cells: list[Cell], machine: str) -> list[Cell]:
     times = {(c.row, c.column): c for c in cells}
     pairs = [(times[k, f"{machine} before"], times[k, f"{machine} after"]) for k in (*OPTIMIZED, "sum")]
     return [
-        Cell(b.row, f"{machine} saved", "us", float(b.published) - float(a.published), float(b.ours) - float(a.ours))  # type: ignore[arg-type]
+        Cell(
+            b.row,
+            f"{machine} saved",
+            "us",
+            published=float(b.published) - float(a.published),  # type: ignore[arg-type]
+            ours=float(b.ours) - float(a.ours),
+        )
         for b, a in pairs
     ]
 
@@ -114,7 +137,14 @@ def _on_h200(frame: Run) -> list[Cell]:
     machine = altered(load_machine("h200"), STORES_H200, "measured", "one block an SM; one SM alone")
     timings = profile(frame.on(machine))
     return [
-        Cell(str(row.kernel), "H200, run for this", "us", row.us, timings[row.kernel].milliseconds * 1e3, aim=AIM)
+        Cell(
+            str(row.kernel),
+            "H200, run for this",
+            "us",
+            published=row.us,
+            ours=timings[row.kernel].milliseconds * 1e3,
+            aim=AIM,
+        )
         for row in published("h200").itertuples()
     ]
 
@@ -125,11 +155,15 @@ def _traffic(table: pd.DataFrame, timings: dict[str, Timing]) -> list[Cell]:
     bound = table[table.memory_percent_after > MEMORY_BOUND]
     return [
         Cell(
-            str(kernel), f"{CANDIDATES[0]} DRAM", "MB", row.memory_percent_after / 100 * peak * row.after_us / 1e6,
-            timings[str(kernel)].dram_bytes / 1e6, aim=0.3,
+            str(kernel),
+            f"{CANDIDATES[0]} DRAM",
+            "MB",
+            published=row.memory_percent_after / 100 * peak * row.after_us / 1e6,
+            ours=timings[str(kernel)].dram_bytes / 1e6,
+            aim=0.3,
         )
         for kernel, row in bound.iterrows()
-    ]  # fmt: skip
+    ]
 
 
 def _figure(cells: list[Cell]) -> Figure:

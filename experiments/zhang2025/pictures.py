@@ -39,7 +39,15 @@ def run(progress: Callable[[str], None]) -> Result:
     try:
         scene = load_scene(SCENE)
     except TilestampError as error:
-        return Result("zhang2025-pictures", "Features off and on", source, [], [], [], [str(error)])
+        return Result(
+            name="zhang2025-pictures",
+            title="Features off and on",
+            source=source,
+            cells=[],
+            figures=[],
+            notes=[],
+            warnings=[str(error)],
+        )
     matrix = CAMERA.matrix(SIZE, SIZE)
     cells, figures = [], []
     for name, (pipeline, machine, off, on) in PAIRS.items():
@@ -51,7 +59,9 @@ def run(progress: Callable[[str], None]) -> Result:
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]
-    return Result("zhang2025-pictures", "Features off and on", source, cells, figures, notes)
+    return Result(
+        name="zhang2025-pictures", title="Features off and on", source=source, cells=cells, figures=figures, notes=notes
+    )
 
 
 def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:
@@ -60,8 +70,8 @@ def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:
     rms = float(np.sqrt((change**2).mean()))
     share = float((change != 0.0).any(axis=2).mean())
     return [
-        Cell(name, "RMS difference", "of 255", None, rms, "reported"),
-        Cell(name, "pixels that change", "%", None, 100.0 * share, "reported"),
+        Cell(name, "RMS difference", "of 255", published=None, ours=rms, status="reported"),
+        Cell(name, "pixels that change", "%", published=None, ours=100.0 * share, status="reported"),
     ]
 
 

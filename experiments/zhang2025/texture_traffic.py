@@ -69,7 +69,9 @@ def run(progress: Callable[[str], None]) -> Result:
                     )  # fmt: skip
                 label = f"{texture_filter}, {degrees} degrees, {minification:g} texels a pixel"
                 ratio = counts["tiles 4x4"] / counts["rows"]
-                cells.append(Cell(label, "tiles 4x4 / rows, transactions", "1", None, ratio, "reported"))
+                cells.append(
+                    Cell(label, "tiles 4x4 / rows, transactions", "1", published=None, ours=ratio, status="reported")
+                )
                 wide.append(counts["tiles 8x8"] / counts["rows"])
     table = pd.DataFrame(rows)
     shown = table[(table["filter"] == "bilinear") & (table.layout != "tiles 8x8")]
@@ -91,5 +93,12 @@ def run(progress: Callable[[str], None]) -> Result:
     ]
     source = "Zhang 2025 names an optimized tile linear storage, without figures"
     return Result(
-        "zhang2025-texture_traffic", "Texture traffic by layout", source, cells, [figure], notes, [], {"traffic": table}
+        name="zhang2025-texture_traffic",
+        title="Texture traffic by layout",
+        source=source,
+        cells=cells,
+        figures=[figure],
+        notes=notes,
+        warnings=[],
+        tables={"traffic": table},
     )

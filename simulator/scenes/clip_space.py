@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.scenes.camera import ModelToClip
-from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.scenes.geometry import Mesh
 
 
 def read_clip_space(path: str | Path) -> Mesh:
@@ -41,11 +40,6 @@ def clip_space_mesh(positions: ArrayLike, triangles: ArrayLike, source: str | Pa
     if array.ndim != 2 or array.shape[1] != 4 or array.dtype.kind not in "fiu":
         raise TilestampError(f"{source}: positions must be (V, 4) numbers, not {array.shape} of {array.dtype}")
     return Mesh(finite_positions(array, source), vertex_numbers(triangles, len(array), source), clip_space=True)
-
-
-def clip_space_scene(mesh: Mesh, name: str) -> Scene:
-    """Give a clip-space mesh as a scene; its only view leaves it where it is."""
-    return Scene(name, mesh=mesh, views={"default": ModelToClip(np.eye(4))})
 
 
 def checked_mesh(mesh: Mesh, source: str | Path) -> Mesh:

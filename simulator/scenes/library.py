@@ -11,10 +11,10 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
-from tilestamp.simulator.scenes.clip_space import checked_mesh, clip_space_scene, read_clip_space
+from tilestamp.simulator.scenes.clip_space import checked_mesh, read_clip_space
 from tilestamp.simulator.scenes.obj_file import read_obj
 from tilestamp.simulator.scenes.quad_cage import cage_of
-from tilestamp.simulator.scenes.scene import Patches, Scene
+from tilestamp.simulator.scenes.scene import Patches, Scene, clip_space_scene
 from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from tilestamp.simulator.scenes.subpatches import split_to_count, with_mesh
 from tilestamp.simulator.scenes.textured_mesh import read_gltf

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.scenes.scene import Mesh
+from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.xorshift import AUTHORS_SEED, draw_floats, random_state
 
 TARGET_TRIANGLES = 1 << 20

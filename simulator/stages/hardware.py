@@ -201,4 +201,4 @@ def _work(
         Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
     )
     events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
-    return FixedFunctionWork("hardware", "draw", items, events, streams), rasterized
+    return FixedFunctionWork(stage="hardware", kernel="draw", items=items, events=events, streams=streams), rasterized

@@ -92,7 +92,15 @@ def thread_per_item(
             moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
             streams.append(Stream(access.buffer, op, moved, footprint))  # type: ignore[arg-type]
     table = np.concatenate([table, np.zeros((idle_blocks, len(ThreadEvent)), np.int64)])
-    return Work(stage, kernel, ThreadEvent, table, len(table), block, streams=tuple(streams))
+    return Work(
+        stage=stage,
+        kernel=kernel,
+        events=ThreadEvent,
+        table=table,
+        grid=len(table),
+        block=block,
+        streams=tuple(streams),
+    )
 
 
 @cache

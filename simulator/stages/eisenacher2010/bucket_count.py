@@ -239,7 +239,15 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
         stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
         table[rows, [BucketInitEvent.STORE_TRANSACTIONS, BucketInitEvent.STORE_BYTES]] = stores
     stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
-    return Work("bucket_count", "bucket_init", BucketInitEvent, table, len(sizes), BLOCK, streams=(stream,))
+    return Work(
+        stage="bucket_count",
+        kernel="bucket_init",
+        events=BucketInitEvent,
+        table=table,
+        grid=len(sizes),
+        block=BLOCK,
+        streams=(stream,),
+    )
 
 
 def _address_work(
@@ -262,12 +270,12 @@ def _address_work(
         ),
     )
     return Work(
-        "bucket_count",
-        "address_calculation",
-        _E,
-        table,
-        len(table),
-        BLOCK,
+        stage="bucket_count",
+        kernel="address_calculation",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
         streams=streams,
         atomic_requests=requests,
         variant=tiles.variant + " aggregated" * aggregate,

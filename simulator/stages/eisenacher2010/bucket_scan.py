@@ -91,7 +91,16 @@ def _buffers(level: int) -> tuple[str, str]:
 
 def _work(kernel: str, size: int, table: NDArray[np.int64], shared_bytes: int, streams: tuple[Stream, ...]) -> Work:
     blocks = -(-size // ELEMENTS)
-    return Work("bucket_scan", kernel, _E, table, blocks, BLOCK, shared_bytes, streams=streams)
+    return Work(
+        stage="bucket_scan",
+        kernel=kernel,
+        events=_E,
+        table=table,
+        grid=blocks,
+        block=BLOCK,
+        shared_bytes=shared_bytes,
+        streams=streams,
+    )
 
 
 def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:

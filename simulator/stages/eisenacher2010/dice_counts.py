@@ -55,7 +55,16 @@ def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
         Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES),
         Stream("boxes", "store", boxes, boxes),
     )
-    return Work("dice", "dice", _E, table, len(table), BLOCK, VERTICES * POINT_BYTES * per_block, streams=streams)
+    return Work(
+        stage="dice",
+        kernel="dice",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        shared_bytes=VERTICES * POINT_BYTES * per_block,
+        streams=streams,
+    )
 
 
 def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

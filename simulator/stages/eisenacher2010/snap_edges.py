@@ -120,7 +120,7 @@ def _works(snapped: Snapped, patches: int, simt: Simt, textured: bool) -> tuple[
     table = np.add.reduceat(counts, starts, axis=0)
     again = dice_work(int(snapped.touched.sum()), patches, textured, simt)
     return (
-        Work("snap_edges", "snap_edges", SnapEvent, table, len(starts), BLOCK),
+        Work(stage="snap_edges", kernel="snap_edges", events=SnapEvent, table=table, grid=len(starts), block=BLOCK),
         replace(again, stage="snap_edges"),
     )
 

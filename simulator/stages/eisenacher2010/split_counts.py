@@ -165,7 +165,7 @@ def _blocks(threads: int) -> int:
 
 
 def _work(kernel: str, events: type[IntEnum], table: NDArray[np.int64], *streams: Stream) -> Work:
-    return Work(STAGE, kernel, events, table, len(table), BLOCK, streams=streams)
+    return Work(stage=STAGE, kernel=kernel, events=events, table=table, grid=len(table), block=BLOCK, streams=streams)
 
 
 def transform_work(patches: int, simt: Simt) -> Work:

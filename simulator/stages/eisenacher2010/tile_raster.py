@@ -167,13 +167,13 @@ def _work(
     """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
     shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
     return Work(
-        "tile_raster",
-        "tile_raster",
-        _E,
-        table,
-        len(table),
-        shape.tile**2,
-        shared_bytes(shape),
+        stage="tile_raster",
+        kernel="tile_raster",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=shape.tile**2,
+        shared_bytes=shared_bytes(shape),
         streams=_streams(table, lists, len(vertices), shape, simt),
         variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )

@@ -91,16 +91,16 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     )
     shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
     work = Work(
-        "across_polygons",
-        "across_polygons",
-        events,
-        table,
-        blocks(simt, WARPS),
-        WARPS * simt.warp,
-        shared,
-        "warp_queue",
-        streams,
-        samples.requests,
+        stage="across_polygons",
+        kernel="across_polygons",
+        events=events,
+        table=table,
+        grid=blocks(simt, WARPS),
+        block=WARPS * simt.warp,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
     return StageResult(samples, (work,))
 

@@ -28,7 +28,19 @@ def motion_interleaved(polygons: MovingMicropolygons, pattern: BlurPattern, samp
     """Draw moving polygons by interleaving; a row of work for each 256 polygons."""
     table = np.zeros((-(-len(polygons.start) // CHUNK), len(MotionEvent)), np.int64)
     _motion_interleaved(polygons.start, polygons.end, polygons.blur, pattern, samples, table)
-    return StageResult(samples, (Work("motion", "interleaved", MotionEvent, table, max(1, len(table)), BLOCK),))
+    return StageResult(
+        samples,
+        (
+            Work(
+                stage="motion",
+                kernel="interleaved",
+                events=MotionEvent,
+                table=table,
+                grid=max(1, len(table)),
+                block=BLOCK,
+            ),
+        ),
+    )
 
 
 @kernel

@@ -48,7 +48,10 @@ def _draw(
 ) -> StageResult[Samples]:
     table = np.zeros((-(-len(polygons.start) // CHUNK), len(MotionEvent)), np.int64)
     _motion_interval(polygons.start, polygons.end, polygons.blur, pattern, samples, intervals, table)
-    return StageResult(samples, (Work("motion", kernel, MotionEvent, table, max(1, len(table)), BLOCK),))
+    return StageResult(
+        samples,
+        (Work(stage="motion", kernel=kernel, events=MotionEvent, table=table, grid=max(1, len(table)), block=BLOCK),),
+    )
 
 
 @kernel

@@ -114,7 +114,16 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
     )
     grid = blocks(simt, WARPS)
     work = Work(
-        "stamps", "stamps", StampsEvent, table, grid, WARPS * simt.warp, 0, "warp_queue", streams, samples.requests
+        stage="stamps",
+        kernel="stamps",
+        events=StampsEvent,
+        table=table,
+        grid=grid,
+        block=WARPS * simt.warp,
+        shared_bytes=0,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
     return StageResult(samples, (work,))
 

@@ -179,7 +179,17 @@ def _work(events: NDArray[np.int64], setup: Any, pairs: int, segments: int, segm
         Stream("headers", "load", max(reads - counts, 0), visible * HEADER_BYTES),
         Stream("bin_queues", "store", writes, min(pairs * ENTRY_BYTES, segments * SEGMENT_BYTES)),
     )
-    return Work("bin_raster", "binRaster", BinRasterEvent, table, STREAMS, BLOCK, SHARED_BYTES, "block_queue", streams)
+    return Work(
+        stage="bin_raster",
+        kernel="binRaster",
+        events=BinRasterEvent,
+        table=table,
+        grid=STREAMS,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        dispatch="block_queue",
+        streams=streams,
+    )
 
 
 def _counters(work: Work) -> dict[str, tuple[int, int]]:

@@ -199,7 +199,17 @@ def _work(
         ),
         Stream("tile_queues", "store", int(table[:, E.STORE_BYTES].sum()), segments * SEGMENT_BYTES),
     )
-    return Work("coarse_raster", "coarseRaster", E, table, simt.sms, BLOCK, SHARED_BYTES, "block_queue", streams)
+    return Work(
+        stage="coarse_raster",
+        kernel="coarseRaster",
+        events=E,
+        table=table,
+        grid=simt.sms,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        dispatch="block_queue",
+        streams=streams,
+    )
 
 
 def _count_sort(events: NDArray[np.int64], bins: int) -> None:

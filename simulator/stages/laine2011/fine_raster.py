@@ -217,17 +217,17 @@ def _work(
     if release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
         queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
     return Work(
-        "fine_raster",
-        "fineRaster",
-        FineRasterEvent,
-        table,
-        simt.sms,
-        32 * WARPS,
-        shared,
-        "warp_queue",
-        _streams(table, setup, len(tile_entries), width, height, samples),
-        queue,
-        "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa",
+        stage="fine_raster",
+        kernel="fineRaster",
+        events=FineRasterEvent,
+        table=table,
+        grid=simt.sms,
+        block=32 * WARPS,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=_streams(table, setup, len(tile_entries), width, height, samples),
+        atomic_requests=queue,
+        variant="" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa",
     )
 
 

@@ -249,13 +249,13 @@ def triangle_setup(
             _setup_several(several, positions, triangles, view, out)
     streams = _streams(positions, triangles, out, view)
     work = Work(
-        "triangle_setup",
-        "triangleSetup",
-        TriangleSetupEvent,
-        table,
-        -(-F // BLOCK),
-        BLOCK,
-        SHARED_BYTES,
+        stage="triangle_setup",
+        kernel="triangleSetup",
+        events=TriangleSetupEvent,
+        table=table,
+        grid=-(-F // BLOCK),
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
         streams=streams,
         variant=variant,
     )

@@ -258,4 +258,15 @@ def _make_work(
         Stream("frame", "atomic", served, CHUNK_BYTES * int(np.count_nonzero(requests))),
     )
     kernel = "freepipe_early" if early else "freepipe"
-    return Work("freepipe", kernel, E, table, blocks, block, 0, "blocks", streams, requests)
+    return Work(
+        stage="freepipe",
+        kernel=kernel,
+        events=E,
+        table=table,
+        grid=blocks,
+        block=block,
+        shared_bytes=0,
+        dispatch="blocks",
+        streams=streams,
+        atomic_requests=requests,
+    )

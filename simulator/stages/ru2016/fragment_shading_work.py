@@ -94,7 +94,15 @@ def shading_work(
         Stream("colors", "store", 12 * fragments, 12 * fragments),
     )
     kernel = f"fragment_shading_{texture_filter}"
-    return Work("fragment_shading", kernel, event, table, len(table), BLOCK, streams=streams)
+    return Work(
+        stage="fragment_shading",
+        kernel=kernel,
+        events=event,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        streams=streams,
+    )
 
 
 def _by_warp(pixels: NDArray[Any]) -> NDArray[Any]:

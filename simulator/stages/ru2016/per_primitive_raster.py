@@ -112,8 +112,8 @@ def per_primitive_raster(
         ),
     )
     work = Work(
-        "per_primitive_raster", "per_primitive_raster", PerPrimitiveEvent, events, blocks, BLOCK,
-        streams=streams, atomic_requests=requests, variant="textured" if textured else "",
+        stage="per_primitive_raster", kernel="per_primitive_raster", events=PerPrimitiveEvent, table=events,
+        grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests, variant="textured" if textured else "",
     )  # fmt: skip
     return StageResult((Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race), (work,))
 

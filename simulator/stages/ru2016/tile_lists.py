@@ -93,7 +93,7 @@ def tile_lists(
         lost = fill(*shape, int(simt.atomic_merge), room, limits, sizes, entries, requests, events)
         _add_primitive_loads(events, simt)
         return sizes, lost, Work(
-            "tile_lists", kernel, TileListEvent, events, blocks, BLOCK,
+            stage="tile_lists", kernel=kernel, events=TileListEvent, table=events, grid=blocks, block=BLOCK,
             streams=_streams(events, len(drawable), tiles), atomic_requests=requests,
         )  # fmt: skip
 

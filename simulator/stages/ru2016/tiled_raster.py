@@ -193,7 +193,15 @@ def tiled_raster(
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
         ),
     )
-    work = Work("tiled_raster", "tiled_raster", TiledRasterEvent, events, tiles, tile * tile, streams=streams)
+    work = Work(
+        stage="tiled_raster",
+        kernel="tiled_raster",
+        events=TiledRasterEvent,
+        table=events,
+        grid=tiles,
+        block=tile * tile,
+        streams=streams,
+    )
     return StageResult(visible, (work,))
 
 

@@ -108,7 +108,16 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
     work = Work(
-        "bit_mask", "bit_mask", BitMaskEvent, table, grid, block, shared, "warp_queue", streams, samples.requests
+        stage="bit_mask",
+        kernel="bit_mask",
+        events=BitMaskEvent,
+        table=table,
+        grid=grid,
+        block=block,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
     )
     return StageResult(samples, (work,))
 

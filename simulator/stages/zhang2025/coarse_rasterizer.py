@@ -104,7 +104,14 @@ def coarse_rasterizer(
     )
     kernel = "CoarseRasterizer" if unrolled else "CoarseRasterizer_before"
     work = Work(
-        "CoarseRasterizer", kernel, CoarseRasterizerEvent, events, len(events), BLOCK, SHARED_BYTES, streams=streams
+        stage="CoarseRasterizer",
+        kernel=kernel,
+        events=CoarseRasterizerEvent,
+        table=events,
+        grid=len(events),
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=streams,
     )
     return StageResult(TileQueues(starts, entries, columns * TILES_A_ROW), (work,))
 

@@ -107,7 +107,16 @@ def fine_rasterizer(
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
-    work = Work("FineRasterizer", kernel, FineRasterizerEvent, table, len(table), 32 * group, shared, streams=streams)
+    work = Work(
+        stage="FineRasterizer",
+        kernel=kernel,
+        events=FineRasterizerEvent,
+        table=table,
+        grid=len(table),
+        block=32 * group,
+        shared_bytes=shared,
+        streams=streams,
+    )
     return StageResult(out, (work,))
 
 

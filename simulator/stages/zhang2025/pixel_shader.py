@@ -146,7 +146,15 @@ def pixel_shader(
         Stream("pixel_base", "atomic", 16 * count, min(16 * count, 4 * pixels)),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
-    work = Work("PixelShader", kernel, PixelShaderEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(
+        stage="PixelShader",
+        kernel=kernel,
+        events=PixelShaderEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
     return StageResult(stream, (work,))
 
 

@@ -186,5 +186,13 @@ def primitive_assembly(
         Stream("primitives", "store", used * PRIMITIVE_BYTES, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
-    work = Work(stage, stage, PrimitiveAssemblyEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveAssemblyEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
     return StageResult(Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), (work,))

@@ -145,7 +145,16 @@ def primitive_binning(
         ),
     )
     stage = "PrimitiveBinning"
-    work = Work(stage, stage, PrimitiveBinningEvent, events, blocks, BLOCK, SHARED_BYTES, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveBinningEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=streams,
+    )
     return StageResult(BinQueues(starts, entries), (work,))
 
 

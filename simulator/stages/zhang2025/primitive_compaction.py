@@ -73,7 +73,15 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> Stage
         Stream("compacted", "store", len(kept) * PRIMITIVE_BYTES, len(kept) * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveCompaction"
-    work = Work(stage, stage, PrimitiveCompactionEvent, events, blocks, BLOCK, streams=streams)
+    work = Work(
+        stage=stage,
+        kernel=stage,
+        events=PrimitiveCompactionEvent,
+        table=events,
+        grid=blocks,
+        block=BLOCK,
+        streams=streams,
+    )
     return StageResult(Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), (work,))
 
 

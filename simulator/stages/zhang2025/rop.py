@@ -125,7 +125,16 @@ def rop(
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel, shared = ("ROP", 2 * 4 * KEPT * 256) if optimized else ("ROP_before", 0)
-    work = Work("ROP", kernel, RopEvent, events, len(events), BLOCK_SIDE**2, shared, streams=streams)
+    work = Work(
+        stage="ROP",
+        kernel=kernel,
+        events=RopEvent,
+        table=events,
+        grid=len(events),
+        block=BLOCK_SIDE**2,
+        shared_bytes=shared,
+        streams=streams,
+    )
     far = depth > int(DEPTH_STEPS)
     shown = np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32)
     return StageResult(Resolved(target, shown, winners), (work,))
