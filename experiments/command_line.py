@@ -6,6 +6,8 @@ import sys
 from types import FrameType
 from typing import TYPE_CHECKING
 
+import tilestamp
+
 if TYPE_CHECKING:
     from cyclopts import App
 
@@ -58,25 +60,34 @@ def _run(arguments: list[str]) -> int:
     from tilestamp.models.errors import TilestampError
 
     try:
-        _app()(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        _app(arguments)(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except (TilestampError, CycloptsError) as error:
         sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}\n")
         return BAD_INPUT
     return 0
 
 
-def _app() -> "App":
-    """Put the commands together."""
+def _app(arguments: list[str]) -> "App":
+    """Put the commands together; ``render`` has the flags of the pipeline that the arguments name."""
     from cyclopts import App
 
     from tilestamp.experiments.commands.catalogue import catalogue
     from tilestamp.experiments.commands.measure_machine import measure_machine
-    from tilestamp.experiments.commands.render import render
+    from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
+    from tilestamp.experiments.commands.render import PIPELINE, render
     from tilestamp.experiments.commands.reproduce import reproduce
     from tilestamp.experiments.commands.validate import validate
 
-    app = App(name="tilestamp", help=HELP, help_format="markdown", suppress_keyboard_interrupt=False)
-    for command in (render, reproduce, validate, measure_machine):
+    app = App(
+        name="tilestamp",
+        version=tilestamp.__version__,
+        help=HELP,
+        help_format="markdown",
+        suppress_keyboard_interrupt=False,
+    )
+    draws = arguments[:1] == ["render"]
+    app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
+    for command in (reproduce, validate, measure_machine):
         app.command(command)
     app.command(catalogue, name="list")
     return app

@@ -34,6 +34,7 @@ class Run:
     height: int
     fidelity: Fidelity
     options: dict[str, Any]
+    """All of the pipeline, defaults included, as plain values."""
     frame: Frame
     note: str = ""
     error: float = 0.0

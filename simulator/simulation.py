@@ -7,6 +7,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import FIDELITIES, Fidelity
 from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.options import plain
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sampling.completed import completed
@@ -61,7 +62,7 @@ def simulate(
     picture : bool
         Whether one is wanted; without it what only makes the picture is skipped.
     **options
-        The pipeline's own: ``tile``, ``spp``, ``bound``, ``msaa``, ``mode``...
+        The pipeline's own: ``tilestamp list options PIPELINE``.
 
     Returns
     -------
@@ -74,7 +75,8 @@ def simulate(
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
     machine = load_machine(machine) if isinstance(machine, str) else machine
-    _check(pipeline, fidelity, width, height, options)
+    _check(fidelity, width, height)
+    chosen = pipeline_options(pipeline, options)
     if not 0.0 <= error < 1.0:
         raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
     view = read_camera(camera if camera is not None else "default", scene)
@@ -83,18 +85,25 @@ def simulate(
     execute = (
         SampledExecutor(error, seed, pipeline, machine) if sampled else Executor(counting=counting, picture=picture)
     )
-    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, execute, **options)
+    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, chosen, execute)
     run = Run(
-        scene.name, pipeline, machine, width, height, fidelity, options, frame, scene.note, error, counted=counting
+        scene.name,
+        pipeline,
+        machine,
+        width,
+        height,
+        fidelity,
+        plain(chosen),
+        frame,
+        scene.note,
+        error,
+        counted=counting,
     )
     return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 
-def _check(pipeline: str, fidelity: str, width: int, height: int, options: dict[str, Any]) -> None:
+def _check(fidelity: str, width: int, height: int) -> None:
     """Refuse what no pipeline can draw."""
-    known = pipeline_options(pipeline)
-    for name in options.keys() - known.keys():
-        raise TilestampError(f"the pipeline {pipeline} has no option {name}; it has {', '.join(known)}")
     if fidelity not in FIDELITIES:
         raise TilestampError(f"fidelity is {', '.join(FIDELITIES)}, not {fidelity}")
     if width < 1 or height < 1:

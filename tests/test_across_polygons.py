@@ -5,7 +5,6 @@ import pytest
 
 from tests import naive_ste
 from tests.test_stamps import GT200, HEIGHT, WIDTH, soup
-from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.stages.fatahalian2009.across_polygons import (
     CHUNK,
     PACKINGS,
@@ -67,11 +66,6 @@ def test_repacking_is_never_longer_than_waiting_and_sets_up_more_often():
 def test_every_polygon_is_set_up_once():
     for packing in PACKINGS:
         assert draw(soup(500), packing)[1].total(AcrossPolygonsEvent.POLYGONS) == 500
-
-
-def test_an_unknown_packing_is_refused():
-    with pytest.raises(TilestampError, match="in-order"):
-        draw(soup(), "tight")
 
 
 def test_nothing_is_drawn_of_nothing():

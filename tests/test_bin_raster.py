@@ -127,11 +127,6 @@ def test_machines_without_ballots_are_refused():
         bin_raster(small(), 64, 64, Simt(coalescing=Coalescing.HALF_WARP_SEGMENTS))
 
 
-def test_unknown_releases_are_refused():
-    with pytest.raises(TilestampError, match="nvdiffrast"):
-        bin_raster(small(), 64, 64, Simt(), release="2.0")
-
-
 @pytest.mark.parametrize(("name", "width"), SCENES)
 def test_bins_hold_as_many_entries_as_on_the_gpu(shared, name, width):
     queues, _, facts = bin_raster(*gpu_input(shared, name, width, "nvdiffrast"), Simt())

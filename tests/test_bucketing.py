@@ -9,7 +9,6 @@ from numba import get_num_threads, set_num_threads
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_buckets, naive_conflicts
 from tilestamp.models.atomics import count_atomics
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch, send_requests
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketCountEvent as Event
@@ -149,11 +148,6 @@ def test_writes_of_one_warp_to_one_list_share_segments():
     boxes = np.tile(np.float32([1, 1, 2, 2]), (64, 1))
     writes = bucketed(boxes, 8, 4, H200)[7]
     assert writes[0].total(BucketWriteEvent.STORE_BYTES) == 64 * 4
-
-
-def test_a_tile_size_without_a_kernel_is_refused_by_name():
-    with pytest.raises(TilestampError, match="tile must be one of 4, 8, 16 or 32 pixels, not 5"):
-        screen_tiles(WIDTH, HEIGHT, 5, 4)
 
 
 @pytest.mark.shared

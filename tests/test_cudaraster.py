@@ -10,7 +10,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import cudaraster as module
-from tilestamp.simulator.pipelines.cudaraster import cudaraster
+from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
@@ -32,7 +32,7 @@ def soup(seed=1, count=60):
 
 
 def draw(what, size=(40, 30), counting=True, **options):
-    return cudaraster(what, EYE, *size, Simt(), Executor(counting=counting), **options)
+    return cudaraster(what, EYE, *size, Simt(), CudarasterOptions(**options), Executor(counting=counting))
 
 
 def test_row_0_is_the_top_and_background_is_minus_1():
@@ -63,7 +63,7 @@ def test_model_space_goes_through_the_matrix():
     matrix = np.array([[0.5, 0, 0, 0.1], [0, 0.5, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 1.0]])
     positions = np.array([[-1, -1, 0, 1], [1, -1, 0.5, 1], [0, 1, 0, 1]], np.float32)
     model = Scene("model", mesh=Mesh(positions, np.array([[0, 1, 2]], np.int32)))
-    frame = cudaraster(model, matrix, 40, 30, Simt(), Executor())
+    frame = cudaraster(model, matrix, 40, 30, Simt(), CudarasterOptions(), Executor())
     straight = draw(scene(positions @ matrix.T, [[0, 1, 2]]))
     assert np.array_equal(frame.triangle_ids, straight.triangle_ids)
     assert np.array_equal(frame.depth, straight.depth)
@@ -158,11 +158,9 @@ def test_heat_maps_have_a_cell_a_tile_with_the_top_row_first():
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"mode": "wireframe"}, "wireframe"),
-        ({"release": "2.0"}, "2.0"),
-        ({"release": "nvdiffrast", "mode": "blend"}, "nvdiffrast has only 'depth'"),
-        ({"msaa": 16}, "16 samples"),
-        ({"batches": 0}, "0 batches"),
+        ({"release": "nvdiffrast", "mode": "blend"}, "nvdiffrast has mode depth"),
+        ({"release": "nvdiffrast", "msaa": 4}, "msaa 1"),
+        ({"copy_parameters": True}, "release 1.1 does not copy them"),
         ({"size": (4096, 100)}, "4096x100"),
     ],
 )

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from tests import naive_cudaraster as naive
 from tests.tile_lists import box_lists
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.laine2011.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
 from tilestamp.simulator.stages.laine2011.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
@@ -207,12 +206,6 @@ def test_clear_depth_hides_what_is_behind_it():
     behind, _, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.4)
     before, _, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.6)
     assert (behind.ids.max(), before.ids.min()) == (-1, 0)
-
-
-def test_unknown_mode_is_refused():
-    setup, _, _ = triangle_setup(np.zeros((3, 4), np.float32), np.zeros((1, 3), np.int32), 8, 8, Simt(), release="1.1")
-    with pytest.raises(TilestampError, match="wireframe"):
-        fine_raster(setup, *box_lists(setup, 8, 8), 8, 8, Simt(), release="1.1", mode="wireframe")
 
 
 IMAGES = [

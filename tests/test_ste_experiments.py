@@ -7,7 +7,7 @@ from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eis
 from tilestamp.experiments.ste.setting import cube, mean_area, random_polygons, student
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
+from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_options
 from tilestamp.simulator.scenes import load_scene, read_camera
 
 
@@ -79,7 +79,7 @@ def test_a_subdivided_cube_fits_its_window():
 def draw(name, **options):
     scene = load_scene("teapot")
     matrix = read_camera("default", scene).matrix(80, 60)
-    return load_pipeline(name)(scene, matrix, 80, 60, Simt(), Executor(), **options)
+    return load_pipeline(name)(scene, matrix, 80, 60, Simt(), pipeline_options(name, options), Executor())
 
 
 def test_exact_pipelines_draw_the_same_picture():
@@ -101,4 +101,4 @@ def test_the_plain_mask_says_how_many_pixels_are_wrong():
 
 @pytest.mark.parametrize("name", ["stamps", "across-polygons", "bit-mask"])
 def test_every_pipeline_takes_samples_from_a_file(name):
-    assert {"spp", "positions", "edge"} <= set(pipeline_options(name))
+    assert {"spp", "positions", "edge"} <= set(options_type(name).__struct_fields__)

@@ -15,7 +15,7 @@ from tilestamp.models.price import price
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
-from tilestamp.simulator.pipelines.binned import binned
+from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.scenes.textured_mesh import geometry
@@ -45,7 +45,7 @@ def matrix():
 
 
 def draw(scene, matrix, **options):
-    return binned(scene, matrix, WIDTH, HEIGHT, SIMT, Executor(), **options)
+    return binned(scene, matrix, WIDTH, HEIGHT, SIMT, BinnedOptions(**options), Executor())
 
 
 def work(frame, stage):
@@ -178,15 +178,7 @@ def test_the_machine_limits_the_cooperative_launch():
 
 def test_a_picture_beyond_the_bins_is_refused(scene):
     with pytest.raises(TilestampError, match="2048"):
-        binned(scene, CAMERA.matrix(2100, 100), 2100, 100, SIMT, Executor())
-
-
-@pytest.mark.parametrize(
-    "options", [{"order": "any"}, {"texture_layout": "morton"}, {"fragments_a_pixel": -1}, {"opacity": 2.0}]
-)
-def test_a_bad_option_is_refused(scene, matrix, options):
-    with pytest.raises(TilestampError):
-        draw(scene, matrix, **options)
+        binned(scene, CAMERA.matrix(2100, 100), 2100, 100, SIMT, BinnedOptions(), Executor())
 
 
 @pytest.mark.parametrize("optimized", [True, False])

@@ -6,24 +6,40 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from tilestamp.experiments.commands.option_flags import option_table
+from tilestamp.experiments.commands.terminal import print_wrapped
 from tilestamp.experiments.registry import describe, experiment_names, is_slow
+from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import list_machines
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_names
+from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names
 from tilestamp.simulator.scenes import list_scenes
 
-Kind = Literal["scenes", "pipelines", "machines", "experiments"]
+Kind = Literal["scenes", "pipelines", "machines", "experiments", "options"]
 
 
-def catalogue(kind: Kind, /, *, json_: Annotated[bool, Parameter(name="--json", negative="")] = False) -> None:
-    """List scenes, pipelines, machines or experiments, each with one line of what it is.
+def catalogue(
+    kind: Kind,
+    pipeline: str | None = None,
+    /,
+    *,
+    json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> None:
+    """List scenes, pipelines, machines or experiments, or the options of a pipeline, and what each is.
 
     Parameters
     ----------
     kind
         What to list.
+    pipeline
+        Whose options.
     json_
         Print a JSON object instead of lines.
     """
+    if (kind == "options") != (pipeline is not None):
+        raise TilestampError("write: tilestamp list options PIPELINE, or list and one of the other kinds")
+    if pipeline is not None:
+        _list_options(pipeline, json_)
+        return
     lines = entries(kind)
     if json_:
         sys.stdout.write(json.dumps(lines) + "\n")
@@ -31,6 +47,16 @@ def catalogue(kind: Kind, /, *, json_: Annotated[bool, Parameter(name="--json", 
     width = max(map(len, lines), default=0)
     for name, line in lines.items():
         sys.stdout.write(f"{name:{width}}  {line}\n")
+
+
+def _list_options(pipeline: str, json_: bool) -> None:
+    """Print what each option of a pipeline takes, its default and what it is."""
+    options = option_table(options_type(pipeline))
+    if json_:
+        sys.stdout.write(json.dumps(options) + "\n")
+        return
+    rows = [[name, *option.values()] for name, option in options.items()]
+    print_wrapped(["option", "takes", "default", "what it is"], rows)
 
 
 def entries(kind: Kind) -> dict[str, str]:

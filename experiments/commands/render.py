@@ -1,6 +1,5 @@
 """``tilestamp render``: one picture, and the table of its stages."""
 
-import ast
 import json
 import os
 import re
@@ -10,35 +9,33 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
 from tilestamp.experiments.commands.render_output import as_json, print_run, write_map, write_png
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.pipelines import options_type
 from tilestamp.simulator.run import Run
+
+PIPELINE = "micropolygon"  # where none is named
 
 
 def render(
     scene: str,
     *,
-    pipeline: str = "micropolygon",
+    pipeline: str = PIPELINE,
     machine: str = "gtx280",
     size: str = "1024x768",
     camera: str | None = None,
     fidelity: Literal["counts", "bounds", "auto", "schedule"] = "schedule",
     error: float = 0.0,
     seed: int = 0,
+    counting: bool = True,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
-    tile: int | None = None,
-    spp: int | None = None,
-    bound: float | None = None,
-    msaa: int | None = None,
-    mode: str | None = None,
-    release: str | None = None,
-    hybrid: bool | None = None,
-    cull_backfaces: bool | None = None,
     option: Annotated[tuple[str, ...], Parameter(name=["--option", "-O"], negative="")] = (),
     set_: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
+    **flags: str | bool | None,
 ) -> None:
     """Draw SCENE and print what each stage did and how long it would take.
 
@@ -47,7 +44,7 @@ def render(
     scene
         A name (`tilestamp list scenes`) or a file: .bpt, .obj, .ply, .glb, .npz...
     pipeline
-        See `tilestamp list pipelines`.
+        See `tilestamp list pipelines`; `--pipeline NAME --help` shows its options.
     machine
         See `tilestamp list machines`, or a machine file.
     size
@@ -62,31 +59,16 @@ def render(
         its 95 % interval, and there is no picture.
     seed
         Of the random part.
+    counting
+        Count what the machine does; without it there is a picture and no time.
     output
         PNG file for the picture.
     map_
         Also write a heat map of this counter beside the picture, as tests; each pipeline has its own.
     json_
         Print one JSON object instead of tables.
-    tile
-        Edge of a screen tile in pixels.
-    spp
-        Samples a pixel (micropolygon).
-    bound
-        Sub-patches are split until their screen box is under this many pixels, measured on control points;
-        `-O bound_rule=pixel_extent` is the reading that matches the paper's counts.
-    msaa
-        Samples a pixel (cudaraster).
-    mode
-        depth, blend, depth-only or color (cudaraster).
-    release
-        1.1 or nvdiffrast (cudaraster).
-    hybrid
-        Hand the diced grids to the fixed-function rasterizer (micropolygon).
-    cull_backfaces
-        Drop triangles that face away.
     option
-        Any further option of the pipeline, NAME=VALUE.
+        An option of the pipeline as NAME=VALUE (`tilestamp list options PIPELINE`); the flags below are the same.
     set_
         Change the machine for a what-if, SECTION.NAME=VALUE (`--set sm.count=60`).
     """
@@ -94,12 +76,9 @@ def render(
     _check_output(output, map_)
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
-    named = {"tile": tile, "spp": spp, "bound": bound, "msaa": msaa, "mode": mode, "release": release}
-    named |= {"hybrid": hybrid, "cull_backfaces": cull_backfaces}
-    options = {key: value for key, value in named.items() if value is not None}
-    options |= dict(parse_assignment(text) for text in option)
+    options = given_options(options_type(pipeline), flags, option)
     with progress(f"drawing {scene}") as say:
-        asked = {"fidelity": fidelity, "error": error, "seed": seed, "picture": output is not None}
+        asked = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting, "picture": output is not None}
         run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked | options)
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
@@ -129,7 +108,8 @@ def _simulate(
 
     described = load_machine(machine)
     if changes:
-        described = altered(described, dict(map(parse_assignment, changes)), "assumed", "a what-if on the command line")
+        written = {name: literal(value) for name, value in once(map(parted, changes)).items()}
+        described = altered(described, written, "assumed", "a what-if on the command line")
     return simulate(scene, pipeline, described, width=size[0], height=size[1], camera=camera, **asked)
 
 
@@ -139,17 +119,6 @@ def parse_size(size: str) -> tuple[int, int]:
     if match is None:
         raise TilestampError(f"--size is WIDTHxHEIGHT in pixels, as 1600x1200, not {size}")
     return int(match[1]), int(match[2])
-
-
-def parse_assignment(text: str) -> tuple[str, Any]:
-    """Take ``NAME=VALUE`` apart; a value that is no Python literal is a string."""
-    name, separator, value = text.partition("=")
-    if not separator or not name:
-        raise TilestampError(f"write NAME=VALUE, not {text}")
-    try:
-        return name, ast.literal_eval(value)
-    except (ValueError, SyntaxError):
-        return name, value
 
 
 def _check_output(output: Path | None, map_: str | None) -> None:

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from tilestamp.models.compile_cache import on_compiling
 
@@ -57,3 +58,13 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     wide = Console(width=width)
     wide.print(title, style="italic", markup=False, soft_wrap=True)
     wide.print(table)
+
+
+def print_wrapped(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table of words on standard output: long cells go on below, but for the names in the first column."""
+    table = Table(header_style="bold", box=None, pad_edge=False)
+    for index, column in enumerate(columns):
+        table.add_column(column, no_wrap=index == 0)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)

@@ -10,7 +10,8 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.options import plain
+from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 
@@ -53,12 +54,12 @@ def draw(area: float) -> tuple[Run, int]:
     """Draw one area; give the run without its picture, and its triangles."""
     machine = load_machine(MACHINE)
     scene = Scene.sweep(area, WIDTH, HEIGHT)
-    frame = load_pipeline("cudaraster")(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, Executor(), mode="color")
+    options = CudarasterOptions(mode="color")
+    frame = cudaraster(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, options, Executor())
     assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)
-    options = {"mode": "color"}
-    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", options, bare)
+    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", plain(options), bare)
     return run, len(scene.mesh.triangles)
 
 

@@ -24,7 +24,7 @@ from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import traffic
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
-from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes import load_scene
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, VARIANT, with_parameter_copy
 from tilestamp.simulator.work import Work
@@ -189,9 +189,8 @@ def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine
     """Works of a mesh in clip space."""
     import numpy as np
 
-    frame = load_pipeline(pipeline)(
-        load_scene(str(source)), np.eye(4), width, height, machine.simt, Executor(), **options
-    )
+    scene, chosen = load_scene(str(source)), pipeline_options(pipeline, options)
+    frame = load_pipeline(pipeline)(scene, np.eye(4), width, height, machine.simt, chosen, Executor())
     return [work for work in frame.works if isinstance(work, Work)]
 
 

@@ -1,6 +1,7 @@
 """Features off and on, side by side: perspective, filtering, ambient occlusion, transparency, the write race."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines import load_pipeline
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.library import load_scene
 
@@ -53,9 +54,8 @@ def run(progress: Callable[[str], None]) -> Result:
     for name, (pipeline, machine, off, on) in PAIRS.items():
         progress(name)
         simt = load_machine(machine).simt
-        frames = [
-            load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, Executor(), **options) for options in (off, on)
-        ]
+        draw = partial(load_pipeline(pipeline), scene, matrix, SIZE, SIZE, simt)
+        frames = [draw(pipeline_options(pipeline, given), Executor()) for given in (off, on)]
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]

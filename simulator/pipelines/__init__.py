@@ -1,22 +1,21 @@
 """One module for each published system; it reads like its overview figure.
 
-A pipeline is a function that bears its module's name:
-``pipeline(scene, matrix, width, height, simt, *, options...) -> Frame``.
-
-Two keywords are no options: ``sample``, a ``Sampler`` by which expensive stages run on part of their units, and
-``picture``, which says whether one is wanted. ``simulate`` hands them to the pipelines that have them.
+A pipeline is a function that bears its module's name, and a struct of its options beside it:
+``pipeline(scene, matrix, width, height, simt, options, execute) -> Frame``. It hands every stage to its executor
+(``simulator.executor``), which runs all of it or part of it, counts or not, and keeps what the stages did.
 """
 
 import inspect
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options, make_options
 
 Pipeline = Callable[..., Frame]
-INTERNAL = ("sample", "picture")  # keywords that a pipeline may have for simulate
 
 
 def pipeline_names() -> list[str]:
@@ -39,16 +38,18 @@ def load_pipeline(name: str) -> Pipeline:
     return pipeline
 
 
-def pipeline_options(name: str) -> dict[str, inspect.Parameter]:
-    """Options of the pipeline ``name``: its keyword-only parameters, less what ``simulate`` itself hands over."""
-    return {key: p for key, p in _keywords(name).items() if key not in INTERNAL}
+def options_type(name: str) -> type[Options]:
+    """Struct of the options of the pipeline ``name``: the type of its parameter ``options``."""
+    kind: type[Options] = inspect.signature(load_pipeline(name)).parameters["options"].annotation
+    return kind
 
 
-def takes(name: str, keyword: str) -> bool:
-    """Whether the pipeline ``name`` can be handed ``sample`` (run part of the units) or ``picture`` (draw none)."""
-    return keyword in _keywords(name)
+def pipeline_options(name: str, given: dict[str, Any]) -> Options:
+    """Options of the pipeline ``name``, by default but for those given.
 
-
-def _keywords(name: str) -> dict[str, inspect.Parameter]:
-    parameters = inspect.signature(load_pipeline(name)).parameters
-    return {key: p for key, p in parameters.items() if p.kind is p.KEYWORD_ONLY}
+    Raises
+    ------
+    TilestampError
+        An option that the pipeline has not, or a value that it does not take.
+    """
+    return make_options(options_type(name), given, f"the pipeline {name}")

@@ -1,23 +1,22 @@
 """Zhang 2025: sort-middle by bins, tiles and quads; trilinear textures; API order or order-independent transparency."""
 
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines.tiled import check_choices
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import TILE, texture_chains
 from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
-from tilestamp.simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
-from tilestamp.simulator.stages.zhang2025.pixel_shader import FILTERS, OVERDRAW, Filter, pixel_shader
+from tilestamp.simulator.stages.zhang2025.pixel_shader import OVERDRAW, Filter, pixel_shader
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from tilestamp.simulator.stages.zhang2025.primitive_binning import primitive_binning
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import primitive_compaction
@@ -28,66 +27,50 @@ from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 
 
+class BinnedOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline binned."""
+
+    order: Order = "api"
+    """Blend in the order of the triangles with a depth test, or by depth without one (oit: order-independent
+    transparency; then nothing is rejected early)."""
+    texture_filter: Filter = "trilinear"
+    """How textures are filtered."""
+    texture_layout: Literal["tiled", "rows"] = "tiled"
+    """How texels are stored."""
+    texture_tile: Literal[2, 4, 8, 16] = TILE
+    """Texels on a side of a storage tile."""
+    cull_backfaces: bool = True
+    """Cull triangles that face away."""
+    fragments_a_pixel: Annotated[int, Meta(ge=0)] = KEPT
+    """How many a pixel can keep; 0 for all."""
+    fragment_depth: FragmentDepth = "direct"
+    """How the depth that goes to the last test is evaluated: as early z does; or stepped within a quad, as the original
+    did, which leaves one-pixel holes; or less 1e-4, its cure."""
+    opacity: Annotated[float, Meta(ge=0, le=1)] = 1.0
+    """Multiplies every alpha."""
+    optimized: bool = True
+    """The kernels after the optimizations that the source lists, or before."""
+
+
 def binned(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    execute: Executor,
-    *,
-    order: Order = "api",
-    texture_filter: Filter = "trilinear",
-    texture_layout: str = "tiled",
-    texture_tile: int = TILE,
-    cull_backfaces: bool = True,
-    fragments_a_pixel: int = KEPT,
-    fragment_depth: FragmentDepth = "direct",
-    opacity: float = 1.0,
-    optimized: bool = True,
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BinnedOptions, execute: Executor
 ) -> Frame:
     """Textured triangles through bins, tiles, quads and fragment lists (Zhang 2025).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``; at most 2048 pixels on a side.
-    order : {"api", "oit"}
-        Blend in the order of the triangles with a depth test, or by depth without one (then nothing is rejected early).
-    texture_filter : {"nearest", "bilinear", "trilinear"}
-    texture_layout : {"tiled", "rows"}
-    texture_tile : {2, 4, 8, 16}
-        Texels on a side of a storage tile.
-    cull_backfaces : bool
-        Cull triangles that face away.
-    fragments_a_pixel : int
-        How many a pixel can keep (the original: 4); 0 for all.
-    fragment_depth : {"direct", "stepped", "biased"}
-        How the depth that goes to the last test is evaluated: as early z does; or stepped within a quad, as the
-        original did, which leaves one-pixel holes; or less 1e-4, its cure.
-    opacity : float
-        Multiplies every alpha.
-    optimized : bool
-        The kernels after the optimizations that the source lists, or before.
     """
-    check_choices(
-        order=(order, ("api", "oit")),
-        texture_filter=(texture_filter, tuple(FILTERS)),
-        texture_layout=(texture_layout, ("tiled", "rows")),
-        texture_tile=(texture_tile, (2, 4, 8, 16)),
-        fragment_depth=(fragment_depth, tuple(FRAGMENT_DEPTHS)),
-    )
-    if fragments_a_pixel < 0 or not 0.0 <= opacity <= 1.0:
-        raise TilestampError("fragments_a_pixel is 0 or more, opacity between 0 and 1")
+    optimized = options.optimized
     mesh = geometry(scene)
     textures = scene.mesh.textures if scene.mesh else ()
-    chains = texture_chains(
-        textures, tile=texture_tile if texture_layout == "tiled" else 0, mips=texture_filter == "trilinear"
-    )
-    opaque = order == "api"
+    stored = options.texture_tile if options.texture_layout == "tiled" else 0
+    chains = texture_chains(textures, tile=stored, mips=options.texture_filter == "trilinear")
+    opaque = options.order == "api"
 
     vertices = execute(vertex_fetch_and_shading, mesh, matrix, simt).outputs
-    slots = execute(primitive_assembly, mesh, vertices, width, height, simt, culling=cull_backfaces).outputs
+    slots = execute(primitive_assembly, mesh, vertices, width, height, simt, culling=options.cull_backfaces).outputs
     primitives = execute(primitive_compaction, slots, len(mesh.triangles), simt).outputs
     data = execute(triangle_setup, primitives, simt, triangles=len(mesh.triangles)).outputs
     bins = execute(primitive_binning, data.boxes, width, height, simt, triangles=len(mesh.triangles)).outputs
@@ -95,11 +78,11 @@ def binned(
     fragments = execute(fine_rasterizer, data, tiles, width, height, simt, early_z=opaque, optimized=optimized).outputs
     stream = execute(
         pixel_shader, data, tiles, fragments, chains, mesh.texture_ids, simt,
-        texture_filter=texture_filter, opacity=opacity, optimized=optimized,
+        texture_filter=options.texture_filter, opacity=options.opacity, optimized=optimized,
     ).outputs  # fmt: skip
     pixels, (resolve,), _ = execute(
-        rop, data, tiles, fragments, stream, simt, order=order, fragment_depth=fragment_depth,
-        limit=fragments_a_pixel, optimized=optimized,
+        rop, data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
+        limit=options.fragments_a_pixel, optimized=optimized,
     )  # fmt: skip
     image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
 

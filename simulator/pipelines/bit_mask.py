@@ -1,14 +1,15 @@
 """Bit mask: samples that a patch has hit are not tested again by its later micropolygons (Yao et al. 2012)."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines._micropolygon_options import frame_of, wrong_pixels
+from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of, wrong_pixels
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
@@ -18,42 +19,33 @@ from tilestamp.simulator.stages.yao2011.bit_mask import MaskKind
 from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask as filter_samples
 
 
+class BitMaskOptions(MicropolygonInput, frozen=True, kw_only=True):
+    """Options of the pipeline bit-mask."""
+
+    mask: MaskKind = "plain"
+    """The paper's mask, one for each facing, or one that also looks at depth and is exact."""
+    lanes: Annotated[int, Meta(ge=1)] | None = None
+    """Micropolygons in flight in a warp: 1 is the paper's sequence; none: as many as the machine's warp has lanes."""
+    group: Annotated[int, Meta(ge=1)] = 64
+    """Consecutive triangles of a mesh that share a mask."""
+
+
 def bit_mask(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    execute: Executor,
-    *,
-    mask: MaskKind = "plain",
-    lanes: int | None = None,
-    group: int = 64,
-    spp: int = 1,
-    positions: str | None = None,
-    edge: float = 1.0,
-    triangles: bool = False,
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BitMaskOptions, execute: Executor
 ) -> Frame:
     """Micropolygons under a bit mask a patch: samples already hit are filtered (Yao et al.).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
-        As for every pipeline.
-    mask : {"plain", "facing", "depth"}
-        The paper's mask, one for each facing, or one that also looks at depth and is exact.
-    lanes : int, optional
-        Micropolygons in flight in a warp; 1 is the paper's sequence, the machine's warp if not given.
-    group : int
-        Consecutive triangles of a mesh that share a mask.
-    spp, positions, edge, triangles
-        As for ``stamps``.
+    scene, matrix, width, height, simt, options, execute
+        See ``tilestamp.simulator.pipelines``.
     """
-    offsets = sample_positions(spp, positions)
+    offsets = sample_positions(options.spp, options.positions)
     samples, exact = new_samples(width, height, offsets), new_samples(width, height, offsets)
-    made = micropolygons(scene, matrix, width, height, edge, triangles)
-    masked = made if scene.patches is not None else grouped(made, group)
-    execute(filter_samples, masked, samples, mask, simt.warp if lanes is None else lanes, simt)
+    made = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
+    masked = made if scene.patches is not None else grouped(made, options.group)
+    lanes = simt.warp if options.lanes is None else options.lanes
+    execute(filter_samples, masked, samples, options.mask, lanes, simt)
     across_polygons(made, exact, "in-order", simt)  # the picture to compare with: no part of the work
     wrong = wrong_pixels(samples, exact)
     frame = frame_of(samples, made, execute.works, wrong_pixels=int(wrong.sum()))

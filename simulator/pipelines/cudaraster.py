@@ -5,15 +5,18 @@ raster draws each 8x8 tile in shared memory.
 """
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._cudaraster_facts import (
     Counters,
     add_counters,
@@ -29,23 +32,58 @@ from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
 from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
 from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
-from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES, SLACK, Release, triangle_setup
+from tilestamp.simulator.stages.laine2011.triangle_setup import (
+    MAX_SUBTRIANGLES,
+    SLACK,
+    Release,
+    as_published,
+    triangle_setup,
+)
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
-MAX_BATCHES = 1024
+
+class CudarasterOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline cudaraster."""
+
+    release: Release = "1.1"
+    """CudaRaster 1.1, or the copy in nvdiffrast."""
+    msaa: Literal[1, 2, 4, 8] = 1
+    """Samples a pixel (nvdiffrast: 1)."""
+    mode: Mode = "depth"
+    """Depth test and interpolation; no depth, interpolation, blending; depth without colour; neither depth nor
+    interpolation (the published sweep). nvdiffrast has depth alone."""
+    cull_backfaces: bool | None = None
+    """Drop triangles that face away; none: as published, on in 1.1, off in nvdiffrast."""
+    guard_band: bool | None = None
+    """Leave triangles whole that leave the screen by less than 2048 pixels; none: on in 1.1, off in nvdiffrast, whose
+    copies differ: some have it on."""
+    batches: Annotated[int, Meta(ge=1, le=1024)] = 1
+    """Draws that the triangles are divided among; the first clears."""
+    copy_parameters: bool = False
+    """As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory."""
+    first_frame: bool = False
+    """Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
+    they have grown in a frame before, as where frames are timed."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("cull_backfaces", "guard_band"):
+            msgspec.structs.force_setattr(self, name, as_published(getattr(self, name), self.release))
+        if self.release == "nvdiffrast" and (self.mode != "depth" or self.msaa != 1):
+            raise TilestampError(f"release nvdiffrast has mode depth and msaa 1, not {self.mode} and {self.msaa}")
+        if self.copy_parameters and self.release != "nvdiffrast":
+            raise TilestampError(f"copy_parameters: release {self.release} does not copy them; nvdiffrast does")
 
 
 @dataclass
 class _State:
     """What draws of one frame hand on: capacities, pixels and sums."""
 
+    options: CudarasterOptions
     execute: Executor
-    options: dict[str, Any]
     size: tuple[int, int]
     simt: Simt
     colors: NDArray[np.float32] | None
-    first_frame: bool
-    whole: bool  # later draws need the pixels
     capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
@@ -60,16 +98,8 @@ def cudaraster(
     width: int,
     height: int,
     simt: Simt,
+    options: CudarasterOptions,
     execute: Executor,
-    *,
-    release: Release = "1.1",
-    msaa: int = 1,
-    mode: Mode = "depth",
-    cull_backfaces: bool | None = None,
-    guard_band: bool | None = None,
-    batches: int = 1,
-    copy_parameters: bool = False,
-    first_frame: bool = False,
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
@@ -83,57 +113,36 @@ def cudaraster(
         Pixels, at most 2048.
     simt : Simt
         The machine's shape.
+    options : CudarasterOptions
     execute : Executor
         Several batches share their pixels: then all units run.
-    release : {"1.1", "nvdiffrast"}
-    msaa : int
-        1, 2, 4 or 8 samples a pixel (nvdiffrast: 1).
-    mode : {"depth", "blend", "depth-only", "color"}
-        Depth test and interpolation; no depth, interpolation, blending; depth without colour; neither depth nor
-        interpolation (the published sweep).
-    cull_backfaces : bool or None
-        None: as published, on in 1.1, off in nvdiffrast.
-    guard_band : bool or None
-        Leave triangles whole that leave the screen by less than 2048 pixels; None: on in 1.1, off in nvdiffrast, whose
-        copies differ: some have it on.
-    batches : int
-        Draws that the triangles are divided among; the first clears.
-    copy_parameters : bool
-        As nvdiffrast was published: each thread of setup and bin raster copies its parameters to local memory.
-    first_frame : bool
-        Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
-        they have grown in a frame before, as where frames are timed; ``facts["retries"]`` says how often.
 
     Returns
     -------
     Frame
         Depth is the original's fixed point, uint32. With several samples, depth and triangle ids are those of the
-        sample nearest to the pixel's centre.
+        sample nearest to the pixel's centre. ``facts["retries"]``: draws that a first frame repeats.
 
     Raises
     ------
     TilestampError
-        Where the scene or an option cannot be drawn.
+        Where the scene or the size cannot be drawn.
     """
-    _check(release, mode, batches)
-    if copy_parameters and release != "nvdiffrast":
-        raise TilestampError(f"copy_parameters: release {release} does not copy them; nvdiffrast does")
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    options: dict[str, Any] = {"release": release, "samples": msaa, "mode": mode}
-    options |= {"cull_backfaces": cull_backfaces, "guard_band": guard_band}
-    colors = None if mode == "depth-only" or not execute.picture else vertex_colors(mesh, matrix)
-    state = _State(execute, options, (width, height), simt, colors, first_frame, whole=batches > 1)
-    for first, last in _batch_bounds(len(mesh.triangles), batches):
+    colors = None if options.mode == "depth-only" or not execute.picture else vertex_colors(mesh, matrix)
+    state = _State(options, execute, (width, height), simt, colors)
+    for first, last in _batch_bounds(len(mesh.triangles), options.batches):
         _draw(state, positions, mesh.triangles[first:last], first)
-    works = [with_parameter_copy(w) if copy_parameters and w.kernel in COPYING else w for w in execute.works]
-    facts = frame_facts(state.counters, state.needed, release, state.retries)
+    copied = COPYING if options.copy_parameters else ()
+    works = [with_parameter_copy(work) if work.kernel in copied else work for work in execute.works]
+    facts = frame_facts(state.counters, state.needed, options.release, state.retries)
     if not execute.picture:
         return Frame.numbers(works, facts)
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
-    shown = shown_sample(msaa)
+    shown = shown_sample(options.msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
-    image = frame_image(state.buffers, width, height, release, positions, mesh.triangles, colors)
+    image = frame_image(state.buffers, width, height, options.release, positions, mesh.triangles, colors)
     return Frame(
         image,
         state.buffers.depth[shown, :height, :width][::-1],
@@ -151,17 +160,16 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
 
     A stage that overflows is executed to its end all the same; the kernels behind it return at once.
     """
-    execute, (width, height) = state.execute, state.size
-    release, samples, mode = state.options["release"], state.options["samples"], state.options["mode"]
-    depth, _, _, interpolate = MODES[mode]
-    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": release}
+    options, execute, (width, height) = state.options, state.execute, state.size
+    depth, _, _, interpolate = MODES[options.mode]
+    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": options.release}
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
     while True:
         setup, prepared, facts = execute(
-            triangle_setup, positions, triangles, **shape, samples=samples, depth=depth, interpolate=interpolate,
-            cull_backfaces=state.options["cull_backfaces"], guard_band=state.options["guard_band"], variant=mode,
-            capacity=state.capacity["numSubtris"] if state.first_frame else MAX_SUBTRIANGLES,
+            triangle_setup, positions, triangles, **shape, samples=options.msaa, depth=depth, interpolate=interpolate,
+            cull_backfaces=options.cull_backfaces, guard_band=options.guard_band, variant=options.mode,
+            capacity=state.capacity["numSubtris"] if options.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
         if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
             continue
@@ -172,14 +180,14 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
-    state.buffers, drawn, _ = (execute if state.whole else execute.last)(
-        fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
-        colors=state.colors, buffers=state.buffers,
+    state.buffers, drawn, _ = (execute.last if options.batches == 1 else execute)(
+        fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=options.msaa,
+        mode=options.mode, colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
     if execute.counting:
         visible = int(np.count_nonzero(setup.subtriangles))
         counters = setup_counters(prepared[0], drawn[0], visible, len(triangles)) | bin_facts["counters"]
-        counters |= tile_facts["counters"] | fine_counters(drawn[0], depth=depth, msaa=samples)
+        counters |= tile_facts["counters"] | fine_counters(drawn[0], depth=depth, msaa=options.msaa)
         state.counters = add_counters(state.counters, counters)
     tile_maps(state.maps, lists, drawn[0] if execute.counting else None)
 
@@ -197,18 +205,9 @@ def _grow(state: _State, name: str, needed: int, slack: int) -> bool:
         return False
     state.capacity[name] = needed + slack
     state.retries += 1
-    return state.first_frame
+    return state.options.first_frame
 
 
 def _batch_bounds(triangles: int, batches: int) -> list[tuple[int, int]]:
     """First and last triangle of each draw."""
     return [(triangles * i // batches, triangles * (i + 1) // batches) for i in range(batches)]
-
-
-def _check(release: str, mode: str, batches: int) -> None:
-    if mode not in MODES:
-        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
-    if release == "nvdiffrast" and mode != "depth":
-        raise TilestampError(f"mode is {mode!r}; release nvdiffrast has only 'depth'")
-    if not 1 <= batches <= MAX_BATCHES:
-        raise TilestampError(f"{batches} batches: 1 to {MAX_BATCHES} can be drawn")

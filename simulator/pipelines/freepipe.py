@@ -1,16 +1,38 @@
 """FreePipe: one kernel, one thread a triangle, atomics on a frame buffer in DRAM (Liu et al. 2010)."""
 
+from typing import Annotated
+
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
+from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing
 from tilestamp.simulator.stages.liu2010.freepipe import freepipe as draw
 from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+
+
+class FreepipeOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline freepipe."""
+
+    packing: Packing = "64"
+    """One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then a
+    triangle has one colour, the mean of its corners)."""
+    early: bool = False
+    """Read the pixel before the atomic (packing 64)."""
+    block: Annotated[int, Meta(ge=32, le=1024, multiple_of=32)] = BLOCK
+    """Threads in a block."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.early and self.packing == "32":
+            raise TilestampError("early: only packing 64 can be read before its atomic, not 32")
 
 
 def freepipe(
@@ -19,25 +41,15 @@ def freepipe(
     width: int,
     height: int,
     simt: Simt,
+    options: FreepipeOptions,
     execute: Executor,
-    *,
-    packing: Packing = "64",
-    early: bool = False,
-    block: int = BLOCK,
 ) -> Frame:
     """FreePipe: one thread a triangle, atomics on the frame buffer (Liu et al. 2010).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
-    packing : {"64", "32"}
-        One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then
-        a triangle has one colour, the mean of its corners).
-    early : bool
-        Read the pixel before the atomic.
-    block : int
-        Threads in a block.
 
     Returns
     -------
@@ -47,9 +59,10 @@ def freepipe(
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     colors = vertex_colors(mesh, matrix)
-    flat = _flat_colors(colors, mesh.triangles) if packing == "32" else None
+    flat = _flat_colors(colors, mesh.triangles) if options.packing == "32" else None
     frame, _, facts = execute(
-        draw, positions, mesh.triangles, width, height, simt, packing=packing, early=early, block=block, colors=flat,
+        draw, positions, mesh.triangles, width, height, simt,
+        packing=options.packing, early=options.early, block=options.block, colors=flat,
     )  # fmt: skip
     if frame.colors is None:
         image = pixel_colors(frame.ids, positions, mesh.triangles, colors)

@@ -1,11 +1,15 @@
 """The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
 
+from typing import Annotated
+
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.depth_format import DepthFormat
 from tilestamp.simulator.stages.hardware import SUBPIXEL_BITS
@@ -14,36 +18,38 @@ from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
 
 
+class HardwareOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline hardware."""
+
+    cull_backfaces: bool = True
+    """Leave out what is clockwise on the screen."""
+    bits: Annotated[int, Meta(ge=4, le=8)] = SUBPIXEL_BITS
+    """Sub-pixel bits."""
+    depth_format: DepthFormat = "fixed32"
+    """How depth is kept, in 2 or 4 bytes a pixel."""
+
+
 def hardware(
     scene: Scene,
     matrix: NDArray[np.floating],
     width: int,
     height: int,
     simt: Simt,  # noqa: ARG001 - every pipeline is called alike; fixed function has no warps
+    options: HardwareOptions,
     execute: Executor,
-    *,
-    cull_backfaces: bool = True,
-    bits: int = SUBPIXEL_BITS,
-    depth_format: DepthFormat = "fixed32",
 ) -> Frame:
     """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate.
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
-    cull_backfaces : bool
-        Leave out what is clockwise on the screen.
-    bits : int
-        Sub-pixel bits, 4 to 8.
-    depth_format : {"fixed16", "fixed24", "fixed32", "float32"}
-        How depth is kept, in 2 or 4 bytes a pixel.
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     frame, _, facts = execute(
         draw, positions, mesh.triangles, width, height,
-        cull_backfaces=cull_backfaces, bits=bits, depth_format=depth_format,
+        cull_backfaces=options.cull_backfaces, bits=options.bits, depth_format=options.depth_format,
     )  # fmt: skip
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
     return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], facts=dict(facts))

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines.tiled import check_choices, not_drawn
+from tilestamp.simulator.options import Options
+from tilestamp.simulator.pipelines.tiled import not_drawn
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import texture_chains
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
@@ -20,56 +21,56 @@ from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
 from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
 
 
+class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline per-primitive."""
+
+    cull_backfaces: bool = False
+    """Leave out triangles that face away; the original's basic path does not."""
+    race: bool = True
+    """Show what the unprotected writes leave (by the model of ``per_primitive_raster``); false: what was meant."""
+    perspective: bool = True
+    """Perspective-correct interpolation."""
+    texture_filter: Filter = "bilinear"
+    """How textures are filtered."""
+    ssao: bool = False
+    """Screen-space ambient occlusion."""
+
+
 def per_primitive(
     scene: Scene,
     matrix: NDArray[Any],
     width: int,
     height: int,
     simt: Simt,
+    options: PerPrimitiveOptions,
     execute: Executor,
-    *,
-    cull_backfaces: bool = False,
-    race: bool = True,
-    perspective: bool = True,
-    texture_filter: Filter = "bilinear",
-    ssao: bool = False,
 ) -> Frame:
     """Textured triangles by one thread each, with its write race (Ru 2016).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
-    cull_backfaces : bool
-        Leave out triangles that face away; the original's basic path does not.
-    race : bool
-        Show what the unprotected writes leave (by the model of ``per_primitive_raster``); False: what was meant.
-    perspective : bool
-        Perspective-correct interpolation.
-    texture_filter : {"nearest", "bilinear"}
-    ssao : bool
-        Screen-space ambient occlusion.
     """
-    check_choices(texture_filter=(texture_filter, ("nearest", "bilinear")))
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
     vertices, drawable = execute(shaded_primitives, mesh, matrix, width, height, simt, parts).outputs
     execute(clear, width, height, 0, simt)
     meant, raced = execute(
-        per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt, culling=cull_backfaces,
-        textured=bool((mesh.texture_ids >= 0).any()),
+        per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt,
+        culling=options.cull_backfaces, textured=bool((mesh.texture_ids >= 0).any()),
     ).outputs  # fmt: skip
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     wrong = raced.triangles != meant.triangles
-    visible = Visible(raced.triangles, meant.depth) if race else meant
-    fragments = interpolate(mesh, vertices, visible, perspective=perspective)
+    visible = Visible(raced.triangles, meant.depth) if options.race else meant
+    fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
-    if ssao:
+    if options.ssao:
         light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
-    waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
+    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image = execute(
-        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     ).outputs
     return Frame(
         image,
@@ -82,7 +83,8 @@ def per_primitive(
             "pixels drawn": int((meant.triangles >= 0).sum()),
             "launches that the host waits for": waits,
         },
-        warnings=not_drawn(dropped) + (_raced(int(wrong.sum()), int((meant.triangles >= 0).sum())) if race else ()),
+        warnings=not_drawn(dropped)
+        + (_raced(int(wrong.sum()), int((meant.triangles >= 0).sum())) if options.race else ()),
     )
 
 

@@ -1,13 +1,14 @@
 """Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009)."""
 
-from typing import Any
+from typing import Annotated, Any
 
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
-from tilestamp.simulator.pipelines._micropolygon_options import frame_of
+from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import micropolygons
@@ -15,46 +16,33 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 from tilestamp.simulator.stages.fatahalian2009.stamps import Touch, stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamps as draw_stamps
 
+Pixels = Annotated[int, Meta(ge=1, le=1024)]
+Pair = Annotated[tuple[Pixels, ...], Meta(min_length=2, max_length=2)]  # tuple[Pixels, Pixels] crashes msgspec 0.23
+
+
+class StampsOptions(MicropolygonInput, frozen=True, kw_only=True):
+    """Options of the pipeline stamps."""
+
+    stamp: Pixels | Pair = 8
+    """Pixels on a side of a stamp, or its width and height."""
+    touch: Touch = "box"
+    """Which stamps are tested: those that touch the polygon's box, or that the polygon reaches."""
+    coarse: Annotated[int, Meta(ge=0, le=1024)] = 0
+    """Side of the coarse stamp that culls or accepts first, 0 for one level."""
+
 
 def stamps(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    execute: Executor,
-    *,
-    stamp: int | tuple[int, int] = 8,
-    touch: Touch = "box",
-    coarse: int = 0,
-    spp: int = 1,
-    positions: str | None = None,
-    edge: float = 1.0,
-    triangles: bool = False,
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: StampsOptions, execute: Executor
 ) -> Frame:
     """Micropolygons by stamps: n x n pixels tested at once, one level or two (after Fatahalian et al. 2009).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
-        As for every pipeline.
-    stamp : int or (int, int)
-        Width and height of a stamp in pixels.
-    touch : {"box", "polygon"}
-        Which stamps are tested: those that touch the polygon's box, or that the polygon reaches.
-    coarse : int
-        Side of the coarse stamp that culls or accepts first, 0 for one level.
-    spp : int
-        Samples a pixel, 1 to 16.
-    positions : str, optional
-        File of sample positions.
-    edge : float
-        Micropolygons of patches have edges of at most so many pixels.
-    triangles : bool
-        Split micropolygons into triangles.
+    scene, matrix, width, height, simt, options, execute
+        See ``tilestamp.simulator.pipelines``.
     """
-    shape = stamp_shape(stamp, touch, coarse)
-    samples = new_samples(width, height, sample_positions(spp, positions))
-    polygons = micropolygons(scene, matrix, width, height, edge, triangles)
+    shape = stamp_shape(options.stamp, options.touch, options.coarse)
+    samples = new_samples(width, height, sample_positions(options.spp, options.positions))
+    polygons = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
     execute(draw_stamps, polygons, samples, shape, simt)
     return frame_of(samples, polygons, execute.works)

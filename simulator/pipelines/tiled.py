@@ -1,14 +1,15 @@
 """Ru 2016: triangles listed by tile, one block a tile, one thread a pixel."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import texture_chains
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
@@ -20,45 +21,35 @@ from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, til
 from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
 from tilestamp.simulator.work import Work
 
-TILES = range(4, 33)  # pixels on a side; 33x33 threads would be more than a block can have
+
+class TiledOptions(Options, frozen=True, kw_only=True):
+    """Options of the pipeline tiled."""
+
+    tile: Annotated[int, Meta(ge=4, le=32)] = 8
+    """Pixels on a side of a tile; a block has a thread for each."""
+    cull_backfaces: bool = True
+    """Leave out triangles that face away."""
+    capacity: Capacity = "safe"
+    """Count, scan and fill the lists; or the original's room of a tenth of all triangles, which can overflow."""
+    perspective: bool = True
+    """Perspective-correct interpolation."""
+    texture_filter: Filter = "bilinear"
+    """How textures are filtered."""
+    ssao: bool = False
+    """Screen-space ambient occlusion."""
 
 
 def tiled(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    execute: Executor,
-    *,
-    tile: int = 8,
-    cull_backfaces: bool = True,
-    capacity: Capacity = "safe",
-    perspective: bool = True,
-    texture_filter: Filter = "bilinear",
-    ssao: bool = False,
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: TiledOptions, execute: Executor
 ) -> Frame:
     """Textured triangles by tile lists, a thread a pixel (Ru 2016).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, execute
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
-    tile : int
-        Pixels on a side of a tile, 4 to 32.
-    cull_backfaces : bool
-        Leave out triangles that face away.
-    capacity : {"safe", "original"}
-        Count, scan and fill the lists; or the original's room of a tenth of all triangles, which can overflow.
-    perspective : bool
-        Perspective-correct interpolation.
-    texture_filter : {"nearest", "bilinear"}
-    ssao : bool
-        Screen-space ambient occlusion.
     """
-    if tile not in TILES:
-        raise TilestampError(f"a tile of the tiled pipeline has 4 to 32 pixels on a side, not {tile}")
-    check_choices(capacity=(capacity, ("safe", "original")), texture_filter=(texture_filter, ("nearest", "bilinear")))
+    tile = options.tile
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
@@ -74,19 +65,19 @@ def tiled(
         height,
         simt,
         tile=tile,
-        culling=cull_backfaces,
-        capacity=capacity,
+        culling=options.cull_backfaces,
+        capacity=options.capacity,
     )
     visible, (raster,), _ = execute(
         tiled_raster, vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile
     )
-    fragments = interpolate(mesh, vertices, visible, perspective=perspective)
+    fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
-    if ssao:
+    if options.ssao:
         light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
-    waits = 2 * len(parts) + (4 if ssao else 3)  # shading and assembly of each part, raster, shading, copy
+    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image = execute(
-        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=texture_filter
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     ).outputs
     sizes, lost = np.diff(lists.starts), listed["lost"]
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
@@ -135,10 +126,3 @@ def _overflow(lost: int, kept: int) -> tuple[str, ...]:
         "written into the next list: capacity=safe has room for all"
     )
     return (sentence,)
-
-
-def check_choices(**options: tuple[Any, tuple[Any, ...]]) -> None:
-    """Refuse an option that is none of its choices."""
-    for name, (value, choices) in options.items():
-        if value not in choices:
-            raise TilestampError(f"{name} is {' or '.join(map(str, choices))}, not {value}")

@@ -8,7 +8,7 @@ of an odd parent is dropped.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 
 TEXEL_BYTES = 4
-TILE = 4  # texels on a side of a storage tile, by default: 64 bytes
+TILE: Final = 4  # texels on a side of a storage tile, by default: 64 bytes
 MAX_LEVELS = 16  # up to 32768 texels on a side
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)

@@ -7,7 +7,7 @@ file, and the slowest sets the time. The counts here are exact for the coverage 
 and kept in one of the formats of graphics interfaces: 16, 24 or 32 bits of fixed point, or float32.
 """
 
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,14 +118,10 @@ def hardware(
     Raises
     ------
     TilestampError
-        For a size or an option that cannot be, or an index out of range.
+        For a size that cannot be, or an index out of range.
     """
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise TilestampError(f"size {width}x{height}: hardware draws 1 to {MAX_SIDE} pixels in each direction")
-    if not 4 <= bits <= 8:
-        raise TilestampError(f"bits {bits}: hardware snaps to 4 to 8 sub-pixel bits")
-    if depth_format not in DEPTHS:
-        raise TilestampError(f"depth_format {depth_format}: hardware has {', '.join(get_args(DepthFormat))}")
     pieces = make_pieces(positions, triangles, width, height, bits)
     depths = DEPTHS[depth_format]
     ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), depths.far, np.uint32)

@@ -7,7 +7,7 @@ import pytest
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
-from tilestamp.simulator.pipelines.micropolygon import micropolygon
+from tilestamp.simulator.pipelines.micropolygon import MicropolygonOptions, micropolygon
 from tilestamp.simulator.scenes import load_scene, read_camera
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
@@ -47,5 +47,7 @@ def test_bucket_count_with_every_conflict(benchmark, tile):
 def test_frame(benchmark, spp, counting):
     scene, matrix = scene_and_matrix()
     options = {"spp": spp, "counting": counting}
-    frame = benchmark.pedantic(micropolygon, (scene, matrix, *SIZE, GT200), options, rounds=5, warmup_rounds=1)
+    frame = benchmark.pedantic(
+        micropolygon, (scene, matrix, *SIZE, GT200, MicropolygonOptions(**options)), rounds=5, warmup_rounds=1
+    )
     benchmark.extra_info.update({key: frame.facts[key] for key in ("subpatches", "patches_written")})

@@ -41,7 +41,6 @@ MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 
 MAX_QUEUE = 2**24  # sub-patches
 
 BoundRule = Literal["control_points", "pixel_extent"]
-BOUND_RULES = ("control_points", "pixel_extent")
 _SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by path
 
 
@@ -124,9 +123,9 @@ def bound_and_split(
     Raises
     ------
     TilestampError
-        Options out of range, numbers that are not finite, or more than 16 M sub-patches.
+        Numbers that are not finite, or more than 16 M sub-patches.
     """
-    _check(points, bound, bound_rule, near, min_depth, max_depth)
+    _check(points, min_depth, max_depth)
     screen = screen_points(points, matrix, width, height)
     size, limit = np.array([width, height, near], np.float32), np.float32(bound)
     queue, path = _first_queue(len(points))
@@ -194,21 +193,13 @@ def _next_queue(
     return target, target_path
 
 
-def _check(
-    points: NDArray[np.float32], bound: float, bound_rule: str, near: float, min_depth: int, max_depth: int
-) -> None:
+def _check(points: NDArray[np.float32], min_depth: int, max_depth: int) -> None:
     """Refuse what the oracle would never be done with."""
     if points.ndim != 3 or points.shape[1:] != (16, 4):
         raise TilestampError(f"patches need 16 points of 4 numbers each, not an array of shape {points.shape}")
     if not (points[..., 3] > 0).all():
         raise TilestampError("the weights of control points must be positive")
-    if not (np.isfinite(bound) and bound > 0):
-        raise TilestampError(f"bound must be a positive number of pixels, not {bound}")
-    if bound_rule not in BOUND_RULES:
-        raise TilestampError(f"bound_rule must be one of {', '.join(BOUND_RULES)}, not {bound_rule}")
-    if not (np.isfinite(near) and near >= 0):
-        raise TilestampError(f"near must be a distance of 0 or more, not {near}")
-    if not 0 <= min_depth <= max_depth:
-        raise TilestampError(f"min_depth must lie between 0 and max_depth ({max_depth}), not {min_depth}")
+    if min_depth > max_depth:
+        raise TilestampError(f"min_depth is at most max_depth ({max_depth}), not {min_depth}")
     if not 0 <= max_depth <= MAX_DEPTH:
         raise TilestampError(f"max_depth must lie between 0 and {MAX_DEPTH}, not {max_depth}")

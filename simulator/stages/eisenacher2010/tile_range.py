@@ -4,14 +4,14 @@ At most two a side where the bound is no larger than a tile, three where it is n
 """
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 
-TILE_SIZES = (4, 8, 16, 32)  # pixels a side
+TileSize = Literal[4, 8, 16, 32]  # pixels a side
+TILE_SIZES: tuple[TileSize, ...] = get_args(TileSize)
 
 
 class Tiles(NamedTuple):
@@ -44,16 +44,7 @@ def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
         Pixels a side: 4, 8, 16 or 32.
     bound : float
         Pixels that the box of a patch stays below, in each direction.
-
-    Raises
-    ------
-    TilestampError
-        A tile size that has no kernel, or a bound that is no length.
     """
-    if tile not in TILE_SIZES:
-        raise TilestampError(f"tile must be one of 4, 8, 16 or 32 pixels, not {tile}")
-    if not (math.isfinite(bound) and bound > 0):
-        raise TilestampError(f"bound must be a positive number of pixels, not {bound}")
     return Tiles(tile, -(-width // tile), -(-height // tile), max(2, math.ceil(bound / tile) + 1))
 
 

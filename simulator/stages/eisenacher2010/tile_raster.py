@@ -47,7 +47,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
 from tilestamp.simulator.stages.eisenacher2010.tile_sizes import tile_sizes
 from tilestamp.simulator.work import Work
 
-SAMPLES_A_PIXEL = (1, 4, 16)
+Edges = Literal["computed", "loaded"]
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
 SMALLEST_WARP = 16  # lanes: 16 load a grid together
 
@@ -192,7 +192,7 @@ def tile_raster(
     *,
     spp: int = 1,
     box_tests: bool = True,
-    edges: Literal["computed", "loaded"] = "computed",
+    edges: Edges = "computed",
     counting: bool = True,
     units: NDArray[np.int64] | None = None,
 ) -> tuple[Pixels, NDArray[np.int64] | None]:
@@ -229,12 +229,8 @@ def tile_raster(
     Raises
     ------
     TilestampError
-        Samples a pixel, edges or a warp that the kernel does not have.
+        A warp that the kernel does not have.
     """
-    if spp not in SAMPLES_A_PIXEL:
-        raise TilestampError(f"spp must be 1, 4 or 16 samples a pixel, not {spp}")
-    if edges not in ("computed", "loaded"):
-        raise TilestampError(f"edges must be computed or loaded, not {edges}")
     if simt.warp < SMALLEST_WARP or simt.warp.bit_count() > 1:
         raise TilestampError(f"tile_raster needs warps of 16, 32 or 64 lanes, not {simt.warp}")
     shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")

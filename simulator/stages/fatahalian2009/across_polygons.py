@@ -10,12 +10,11 @@ repacked    lanes that are done take further polygons as soon as half of the lan
 """
 
 from enum import IntEnum
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from tilestamp.models.coalescing import contiguous
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -32,7 +31,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygon
 from tilestamp.simulator.work import Work
 
 Packing = Literal["in-order", "sorted", "repacked"]
-PACKINGS = ("in-order", "sorted", "repacked")
+PACKINGS: tuple[Packing, ...] = get_args(Packing)
 CHUNK = 256  # polygons that a warp draws from the queue
 WARPS = 4  # in a block
 SORT_STEPS = 36  # compare-exchange steps of a bitonic sort of 256 keys: 8 * 9 / 2
@@ -73,8 +72,6 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     outputs : Samples
     works : one, a row for each chunk of 256 polygons
     """
-    if packing not in PACKINGS:
-        raise TilestampError(f"packing is {', '.join(PACKINGS)}, not {packing}")
     simt = Simt(*map(int, simt))
     table = np.zeros((-(-len(polygons.patch) // CHUNK), len(AcrossPolygonsEvent)), np.int64)
     idle_to_refill = simt.warp // 2 if packing == "repacked" else simt.warp

@@ -51,15 +51,7 @@ def micropolygons(
 def from_patches(
     patches: Patches, matrix: ArrayLike, width: int, height: int, size: float = 1.0, triangles: bool = False
 ) -> Micropolygons:
-    """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels.
-
-    Raises
-    ------
-    TilestampError
-        ``size`` is not positive.
-    """
-    if not size > 0:
-        raise TilestampError(f"a micropolygon's edge is a positive number of pixels, not {size}")
+    """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels."""
     points = patches.points.astype(np.float64)
     rates = _rates(_project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 16, 3), size)
     ends = np.cumsum(rates**2)

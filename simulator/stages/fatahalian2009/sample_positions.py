@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 
 SUBPIXELS = 4096  # steps of the sub-pixel grid along an axis: vertices and samples are snapped to it
-MOST_SAMPLES = 16
 STANDARD = Path(__file__).parent / "data" / "sample_positions.toml"
 
 
@@ -35,8 +34,6 @@ def sample_positions(spp: int, file: str | Path | None = None) -> NDArray[np.int
     TilestampError
         No such file, no such pattern in it, or a position outside the pixel.
     """
-    if not 1 <= spp <= MOST_SAMPLES:
-        raise TilestampError(f"spp is 1 to {MOST_SAMPLES} samples a pixel, not {spp}")
     path = Path(file) if file is not None else STANDARD
     try:
         patterns = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -75,13 +75,9 @@ class StampShape(NamedTuple):
     coarse: int
 
 
-def stamp_shape(stamp: int | tuple[int, int], touch: Touch, coarse: int = 0) -> StampShape:
+def stamp_shape(stamp: int | tuple[int, ...], touch: Touch, coarse: int = 0) -> StampShape:
     """Check the options of stamps; raises TilestampError."""
     width, height = (stamp, stamp) if isinstance(stamp, int) else stamp
-    if width < 1 or height < 1:
-        raise TilestampError(f"a stamp has at least 1x1 pixels, not {width}x{height}")
-    if touch not in ("box", "polygon"):
-        raise TilestampError(f"touch is box or polygon, not {touch}")
     if coarse and (coarse < max(width, height) or coarse % width or coarse % height):
         raise TilestampError(f"a coarse stamp is a whole number of {width}x{height} stamps wide and high, not {coarse}")
     return StampShape(width, height, touch == "polygon", coarse)

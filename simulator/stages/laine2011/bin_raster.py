@@ -27,7 +27,6 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, 
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 from tilestamp.simulator.work import Work
 
-RELEASES = ("1.1", "nvdiffrast")
 STREAMS = 16  # blocks, and streams of a bin
 MAX_BATCH = 32  # rounds of 512 input triangles
 MAX_BINS = 16  # in each axis
@@ -62,7 +61,7 @@ def bin_raster(
     height: int,
     simt: Simt,
     *,
-    release: Literal["1.1", "nvdiffrast"] = "1.1",
+    release: Literal["1.1", "nvdiffrast"] = "1.1",  # noqa: ARG001 - all four stages are called alike
     counting: bool = True,
     capacity: int | None = None,
 ) -> StageResult[BinQueues]:
@@ -97,7 +96,7 @@ def bin_raster(
     TilestampError
         For a viewport or a machine that the original cannot use.
     """
-    check_viewport(width, height, release)
+    check_viewport(width, height)
     segment_bytes = transaction_bytes(simt, "bin_raster")
     bins_x, bins_y = -(-width // BIN_PIXELS), -(-height // BIN_PIXELS)
     given = BinInput(
@@ -131,18 +130,16 @@ def batch_size(triangles: int) -> int:
     return min(max(triangles // (BLOCK * 32), 1), MAX_BATCH) * BLOCK
 
 
-def check_viewport(width: int, height: int, release: str) -> None:
+def check_viewport(width: int, height: int) -> None:
     """Refuse what the original cannot draw.
 
     Raises
     ------
     TilestampError
-        For a side below 1 or above 2048 pixels, or a release that does not exist.
+        For a side below 1 or above 2048 pixels.
     """
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise TilestampError(f"size {width}x{height}: cudaraster draws 1 to {MAX_SIDE} pixels in each direction")
-    if release not in RELEASES:
-        raise TilestampError(f"release {release!r}: cudaraster has releases {' and '.join(RELEASES)}")
 
 
 def initial_capacity(triangles: int, width: int, height: int) -> int:

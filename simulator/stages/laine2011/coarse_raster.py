@@ -66,7 +66,7 @@ def coarse_raster(
     height: int,
     simt: Simt,
     *,
-    release: Literal["1.1", "nvdiffrast"] = "1.1",
+    release: Literal["1.1", "nvdiffrast"] = "1.1",  # noqa: ARG001 - all four stages are called alike
     deferred_clear: bool = True,
     counting: bool = True,
     capacity: int | None = None,
@@ -106,7 +106,7 @@ def coarse_raster(
     TilestampError
         For a viewport or a machine that the original cannot use.
     """
-    check_viewport(width, height, release)
+    check_viewport(width, height)
     given = _input(bin_queues, setup, width, height, simt)
     order = bin_order(np.diff(bin_queues.starts), deferred_clear)
     bins = len(bin_queues.starts) - 1

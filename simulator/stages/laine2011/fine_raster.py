@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import smallest_transaction_bytes
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -326,13 +325,7 @@ def fine_raster(
     outputs : FrameBuffers
     works : one, a row an active tile
 
-    Raises
-    ------
-    TilestampError
-        For an unknown mode.
     """
-    if mode not in MODES:
-        raise TilestampError(f"mode is {mode!r}; there is {', '.join(MODES)}")
     depth, blend, write_color, interpolate = MODES[mode]
     draw = Draw(
         log_samples=samples.bit_length() - 1,

@@ -117,6 +117,11 @@ def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out
         clip_and_store(scratch, view, out, out.first[t], t, triangles)
 
 
+def as_published(switch: bool | None, release: Release) -> bool:
+    """Whether culling of backfaces and the guard band are on: in 1.1, and not in nvdiffrast, where nothing is said."""
+    return release == "1.1" if switch is None else switch
+
+
 def make_view(
     width: int,
     height: int,
@@ -128,11 +133,7 @@ def make_view(
     interpolate: bool = True,
     guard_band: bool | None = None,
 ) -> View:
-    """Check the viewport and the switches of a draw, and put them in the form that kernels take."""
-    if release not in SUBTRIANGLE_BYTES:
-        raise TilestampError(f"release is {release!r}; there is '1.1' and 'nvdiffrast'")
-    if samples not in (1, 2, 4, 8) or (release == "nvdiffrast" and samples != 1):
-        raise TilestampError(f"{samples} samples a pixel: release 1.1 has 1, 2, 4 and 8, and nvdiffrast has 1")
+    """Check the viewport, and put the switches of a draw in the form that kernels take."""
     if not (1 <= width <= MAX_SIZE and 1 <= height <= MAX_SIZE):
         raise TilestampError(
             f"size {width}x{height}: cudaraster draws 1 to {MAX_SIZE} pixels along an axis, as the original"
@@ -143,8 +144,8 @@ def make_view(
         scale_x=np.float32(8 * width),
         scale_y=np.float32(8 * height),
         log_samples=samples.bit_length() - 1,
-        guard_band=release == "1.1" if guard_band is None else guard_band,
-        cull_backfaces=release == "1.1" if cull_backfaces is None else cull_backfaces,
+        guard_band=as_published(guard_band, release),
+        cull_backfaces=as_published(cull_backfaces, release),
         depth=depth,
         interpolate=interpolate and release == "1.1",
     )

@@ -167,7 +167,7 @@ def freepipe(
     TilestampError
         For an option that does not exist, or an index out of range.
     """
-    _check(width, height, packing, early, block, simt)
+    _check(width, height, simt)
     pieces = make_pieces(positions, triangles, width, height)
     if colors is None:
         colors = ((np.arange(len(triangles)) + 1) & 0xFFFFFF).astype(np.uint32)
@@ -185,20 +185,7 @@ def freepipe(
     return StageResult(frame, (work,), facts)
 
 
-def _check(
-    width: int,
-    height: int,
-    packing: str,
-    early: bool,
-    block: int,
-    simt: Simt,
-) -> None:
-    if packing not in {"64", "32"}:
-        raise TilestampError(f"packing {packing!r}: freepipe packs a fragment in '64' bits or twice '32'")
-    if early and packing == "32":
-        raise TilestampError("early: only packing '64' can be read before its atomic")
-    if block % WARP or not WARP <= block <= 1024:
-        raise TilestampError(f"block {block}: freepipe needs a multiple of {WARP} threads up to 1024")
+def _check(width: int, height: int, simt: Simt) -> None:
     if simt.warp != WARP:
         raise TilestampError(f"freepipe: warps of {simt.warp} lanes are not supported, only {WARP}")
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):

@@ -13,7 +13,7 @@ depth       a set bit filters only if what the patch has at that sample lies in 
 """
 
 from enum import IntEnum
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from tilestamp.simulator.stages.yao2011.bit_mask_words import new_mask, next_wor
 from tilestamp.simulator.work import Work
 
 MaskKind = Literal["plain", "facing", "depth"]
-KINDS = ("plain", "facing", "depth")
+KINDS: tuple[MaskKind, ...] = get_args(MaskKind)
 WARPS = 4  # in a block
 SHARED_WORDS = 512  # mask words of a warp in shared memory; larger masks lie in global memory
 LANE = 8  # columns of a lane's walk: x0, y0, x1, y1 in pixels, row, next word, pending bits, mask layer
@@ -89,8 +89,6 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     outputs : Samples
     works : one, a row for each patch that has polygons
     """
-    if kind not in KINDS:
-        raise TilestampError(f"a mask is {', '.join(KINDS)}, not {kind}")
     simt = Simt(*map(int, simt))
     if not 1 <= lanes <= simt.warp:
         raise TilestampError(f"1 to {simt.warp} micropolygons are in flight in a warp, not {lanes}")

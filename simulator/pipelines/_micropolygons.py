@@ -1,15 +1,30 @@
-"""What the micropolygon pipelines of 2009 and 2012 share: their input, and their picture as a frame."""
+"""What the micropolygon pipelines of 2009 and 2012 share: options of their input, and their picture as a frame."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.options import Options
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.work import FixedFunctionWork, Work
+
+
+class MicropolygonInput(Options, frozen=True, kw_only=True):
+    """How many micropolygons there are, and samples to test them at."""
+
+    spp: Annotated[int, Meta(ge=1, le=16)] = 1
+    """Samples a pixel."""
+    positions: str | None = None
+    """File of sample positions (TOML), in place of the standard ones."""
+    edge: Annotated[float, Meta(gt=0)] = 1.0
+    """Micropolygons of patches have edges of at most so many pixels."""
+    triangles: bool = False
+    """Split micropolygons into triangles."""
 
 
 def frame_of(
