@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ParamSpec, TypeVar
 from tilestamp.simulator.stage import Divisible, StageResult
 
 if TYPE_CHECKING:
-    from tilestamp.simulator.work import FixedFunctionWork, Work
+    from tilestamp.simulator.work import Work
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -32,7 +32,7 @@ class Executor:
     def __init__(self, *, counting: bool = True, picture: bool = True) -> None:
         self.counting = counting
         self.picture = picture
-        self.works: list[Work | FixedFunctionWork] = []
+        self.works: list[Work] = []  # or FixedFunctionWork
 
     def __call__(self, stage: Callable[P, StageResult[T]], *inputs: P.args, **options: P.kwargs) -> StageResult[T]:
         """Run one stage and keep its works."""

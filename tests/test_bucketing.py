@@ -113,7 +113,7 @@ def test_nothing_depends_on_counting_or_on_threads():
     finally:
         set_num_threads(threads)
     for (count, idx), _, _ in results:
-        assert np.array_equal(count, results[0].outputs.count)
+        assert np.array_equal(count, results[0].outputs.counts)
         assert np.array_equal(idx, results[0].outputs.idx)
     assert np.array_equal(results[0].works[1].table, results[2].works[1].table)
     assert np.array_equal(results[0].works[1].atomic_requests, results[2].works[1].atomic_requests)

@@ -77,9 +77,10 @@ def render(
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
     options = given_options(options_type(pipeline), flags, option)
+    asked: dict[str, Any] = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting}
+    asked |= {"picture": output is not None} | options
     with progress(f"drawing {scene}") as say:
-        asked = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting, "picture": output is not None}
-        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked | options)
+        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked)
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
             _ = run.stages

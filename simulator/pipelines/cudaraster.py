@@ -180,10 +180,11 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
-    state.buffers, drawn, _ = (execute.last if options.batches == 1 else execute)(
+    buffers, drawn, _ = (execute.last if options.batches == 1 else execute)(
         fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=options.msaa,
         mode=options.mode, colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
+    state.buffers = buffers
     if execute.counting:
         visible = int(np.count_nonzero(setup.subtriangles))
         counters = setup_counters(prepared[0], drawn[0], visible, len(triangles)) | bin_facts["counters"]

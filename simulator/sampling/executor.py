@@ -40,18 +40,19 @@ class Part:
         CPU seconds that running them took.
     """
 
-    stage: Divisible[Any, Any]
+    stage: Any
     inputs: dict[str, Any]
     sample: Sample
     seconds: float = 0.0
+    outputs: Any = None  # of the last units that ran
 
     def grow(self, taken: Integers) -> None:
         """Run the units that ``taken`` has more than the sample."""
         strata, begin = self.sample.strata, time.process_time()
         old, new = drawn(strata, self.sample.taken), drawn(strata, taken)
         fresh = np.setdiff1d(new, old)
-        rows = self.stage.run(**self.inputs, units=fresh)[1]
-        table = np.empty((len(strata.order), rows.shape[1]), np.int64)
+        self.outputs, rows = self.stage.run(**self.inputs, units=fresh)
+        table = np.empty((len(strata.order), *rows.shape[1:]), np.int64)
         table[fresh] = rows
         if len(old):
             table[old] = self.sample.rows
@@ -60,7 +61,8 @@ class Part:
 
     def work(self) -> Work:
         """Work of all units: as they ran, or as those that ran foretell."""
-        return replace(self.stage.work(expanded(self.sample), **self.inputs), sample=self.sample)
+        work: Work = self.stage.work(expanded(self.sample), **self.inputs)
+        return replace(work, sample=self.sample)
 
 
 class SampledExecutor(Executor):
@@ -100,7 +102,7 @@ class SampledExecutor(Executor):
             part.grow(enlarged(part.sample, measured, self.error) if left else strata.units)
         self.parts[len(self.works)] = part
         self.works.append(part.work())
-        return StageResult(stage.run(**named, units=strata.order[:0])[0], (self.works[-1],))
+        return StageResult(part.outputs, (self.works[-1],))
 
     def _measures(self, part: Part) -> Floats:
         """What the answer is made of, of each unit that ran: instructions, cycles, main counts; (units, quantities)."""

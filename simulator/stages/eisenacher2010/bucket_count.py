@@ -176,7 +176,7 @@ def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, t
 class Counted(NamedTuple):
     """What the first half of bucketing leaves."""
 
-    count: NDArray[np.uint32]  # (tiles,) COUNT: patches in each tile
+    counts: NDArray[np.uint32]  # (tiles,) COUNT: patches in each tile
     idx: NDArray[np.uint32]  # (N, slots**2) IDX: place in the list of each slot's tile; 0 where it holds none
 
 
