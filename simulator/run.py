@@ -1,5 +1,6 @@
 """A run: the picture, what each stage did, how long it would take, and how sure each number is."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -7,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bounds import bounds
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
+from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
@@ -125,17 +129,17 @@ class Run:
     @cached_property
     def launch_intervals(self) -> list[dict[str, Estimate]]:
         """The numbers of ``intervals`` of each launch, in launch order."""
-        launches = zip(self.frame.works, self.launches, self.timings, strict=True)
-        return [self._intervals(work, launch, timing) for work, launch, timing in launches]
+        return [self._intervals(index) for index in range(len(self.launches))]
 
-    def _intervals(self, work: Any, launch: Any, timing: Timing) -> dict[str, Estimate]:
+    def _intervals(self, index: int) -> dict[str, Estimate]:
         """Of one launch."""
+        work, launch, timing = self.frame.works[index], self.launches[index], self.timings[index]
         counts = intervals.count_intervals(work)
         known = {name.lower(): counts.get(name, intervals.exactly(0)) for name in ("SAMPLE_TESTS", "SAMPLE_HITS")}
-        if isinstance(work, Work):
+        if isinstance(work, Work) and isinstance(launch, Launch):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)
-            known["milliseconds"] = intervals.milliseconds(timing, work, ran, self.machine)
+            known["milliseconds"] = intervals.milliseconds(timing, work, launch, ran, self._price(index, timing))
         else:
             known["milliseconds"] = intervals.exactly(timing.milliseconds)
         return known
@@ -144,7 +148,13 @@ class Run:
         """Price the units that ran, where not all did."""
         if work.sample is None or work.sample.complete:
             return None
-        return self._launch(replace(work, table=work.sample.rows, streams=(), atomic_requests=None))
+        return self._launch(replace(work, table=work.sample.sampled, streams=(), atomic_requests=None))
+
+    def _price(self, index: int, timing: Timing) -> Callable[[Launch], float]:
+        """How a launch in place of the ``index``-th is priced, bytes as they are."""
+        moved = traffic(self.launches, self.machine)[index]
+        level = schedule if timing.fidelity == "schedule" else bounds
+        return lambda launch: level(launch, self.machine, moved).milliseconds
 
     @cached_property
     def counts_interval(self) -> dict[str, Estimate]:

@@ -3,7 +3,7 @@
 A stage that can run in part is written as three functions of the same inputs, bound together by ``divisible``:
 
 - the stage itself takes ``units`` (None: all) and returns its outputs and the rows of those units;
-- ``known`` says, before anything runs, what is known of each unit: the work that it will be, up to a factor, and more;
+- ``known`` says, before anything runs, what is known of each unit (``Known``);
 - ``work`` makes the ``Work`` from the rows of all units: launch shape, and the buffers touched.
 
 Called like any stage, it runs all units. An executor (``simulator.executor``, ``simulator.sampling.executor``) may run
@@ -44,13 +44,31 @@ class StageResult(NamedTuple, Generic[T]):
     facts: Mapping[str, Any] = {}
 
 
+class Known(NamedTuple):
+    """What is known of each unit of a stage before any runs, an array of (units,) each.
+
+    Parameters
+    ----------
+    size : ndarray
+        The work that it will be, up to a factor.
+    more : tuple of ndarray
+        Further things, of which some events may be proportional.
+    exact : dict of int to ndarray
+        By event (a column of the work table): what follows from the inputs alone.
+    """
+
+    size: NDArray[Any]
+    more: tuple[NDArray[Any], ...] = ()
+    exact: Mapping[int, NDArray[np.int64]] = {}
+
+
 class Divisible(Generic[P, T]):
     """A stage that can run on part of its units; see the module."""
 
     def __init__(
         self,
         run: Callable[P, tuple[T, Rows | None]],
-        known: Callable[..., tuple[NDArray[Any], ...]],
+        known: Callable[..., Known],
         work: Callable[..., Work],
     ) -> None:
         update_wrapper(self, run)
@@ -70,14 +88,14 @@ class Divisible(Generic[P, T]):
 
 
 def divisible(
-    known: Callable[..., tuple[NDArray[Any], ...]], work: Callable[..., Work]
+    known: Callable[..., Known], work: Callable[..., Work]
 ) -> Callable[[Callable[P, tuple[T, Rows | None]]], Divisible[P, T]]:
     """Make a function of inputs and ``units`` a stage that can run in part.
 
     Parameters
     ----------
     known : callable
-        Takes the inputs by name; returns arrays, (units,) each, the size of a unit first.
+        Takes the inputs by name.
     work : callable
         Takes the rows of all units, and the inputs by name.
     """

@@ -56,7 +56,7 @@ class Part:
         table[fresh] = rows
         if len(old):
             table[old] = self.sample.rows
-        self.sample = Sample(strata, taken, table[new])
+        self.sample = replace(self.sample, taken=taken, rows=table[new])
         self.seconds += time.process_time() - begin
 
     def work(self) -> Work:
@@ -87,12 +87,12 @@ class SampledExecutor(Executor):
     def last(self, stage: Divisible[P, T], *inputs: P.args, **options: P.kwargs) -> StageResult[T]:
         """Run part of a stage's units: enough that all that the run asks for is known within the error."""
         named = stage.inputs(*inputs, **options)
-        size, *more = stage.known(**named)
-        if size.sum() < SMALLEST:
+        known = stage.known(**named)
+        if known.size.sum() < SMALLEST:
             self.too_small = True
             return self(stage, *inputs, **options)
-        strata = make_strata(size, [self.seed, len(self.parts)], *more)
-        part = Part(stage, named, Sample(strata, np.zeros_like(strata.units), np.zeros((0, 0), np.int64)))
+        strata = make_strata(known.size, [self.seed, len(self.parts)], *known.more)
+        part = Part(stage, named, Sample(strata, np.zeros_like(strata.units), np.zeros((0, 0), np.int64), known.exact))
         part.grow(pilot(strata))
         for left in reversed(range(ROUNDS)):
             measured = self._measures(part)

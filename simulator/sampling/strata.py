@@ -3,7 +3,8 @@
 The largest units are a certainty stratum: they always run, so that the schedule sees the worst imbalance as it is.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -63,11 +64,21 @@ class Sample:
         Units that ran of each stratum.
     rows : ndarray, (sum of taken, events)
         Of the units ``drawn(strata, taken)``.
+    exact : dict of int to ndarray, (units,)
+        Columns of the rows that are known of all units.
     """
 
     strata: Strata
     taken: Integers
     rows: Integers
+    exact: Mapping[int, Integers] = field(default_factory=dict)
+
+    @property
+    def sampled(self) -> Integers:
+        """Rows without what is known of all units."""
+        rows = self.rows.copy()
+        rows[:, list(self.exact)] = 0
+        return rows
 
     @property
     def complete(self) -> bool:

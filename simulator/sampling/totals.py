@@ -10,6 +10,7 @@ stratum by stratum, the mean of what it misses (the regression estimator: Cochra
 Everything here is a pure function of sizes, rows and a seed.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -174,20 +175,64 @@ def _smoothed(sample: Sample, fit: _Fit) -> Floats:
 
 
 def expanded(sample: Sample) -> Integers:
-    """Rows of all units, (units, events): as executed, or as foretold, so that totals are the estimates."""
+    """Rows of all units, (units, events): as executed, or what is foretold of them and a miss of those that ran.
+
+    Misses go round the units that ran in the same stratum, so that units are as unlike as those; totals are the
+    estimates.
+    """
     strata, taken = sample.strata, sample.taken
     table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
     table[drawn(strata, taken)] = sample.rows
-    if sample.complete:
-        return table
-    values = sample.rows.astype(np.float64)
-    fit = _fit(sample, values)
-    ran = np.zeros(len(strata.order), np.bool_)
-    ran[places(strata, taken)] = True
-    rows = _product(strata.ordered[~ran], fit.factors) + np.repeat(fit.mean, strata.units - taken, axis=0)
-    np.maximum(rows, 0.0, out=rows)
-    sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
-    rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
-    ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
-    table[strata.order[~ran]] = np.diff(ends, axis=0, prepend=0)
+    if not sample.complete:
+        values, rest = sample.rows.astype(np.float64), left(sample)
+        fit = _fit(sample, values)
+        rows = _product(strata.known[rest], fit.factors) + fit.residual[_donors(sample)]
+        np.maximum(rows, 0.0, out=rows)
+        sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
+        rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
+        ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
+        table[rest] = np.diff(ends, axis=0, prepend=0)
+    for event, column in sample.exact.items():
+        table[:, event] = column
     return table
+
+
+def left(sample: Sample) -> Integers:
+    """Units that did not run, stratum after stratum."""
+    ran = np.zeros(len(sample.strata.order), np.bool_)
+    ran[places(sample.strata, sample.taken)] = True
+    units: Integers = sample.strata.order[~ran]
+    return units
+
+
+def _donors(sample: Sample, random: np.random.Generator | None = None) -> Integers:
+    """For each unit of ``left`` the row of one that ran in its stratum: in turn, or drawn from a bootstrap sample."""
+    taken, rest = sample.taken, sample.strata.units - sample.taken
+    first = np.cumsum(taken) - taken
+    many, start = np.repeat(taken, rest), np.repeat(first, rest)
+    if random is None:
+        turn = np.arange(rest.sum()) - np.repeat(np.cumsum(rest) - rest, rest)
+        in_turn: Integers = start + turn % many
+        return in_turn
+    again = np.repeat(first, taken) + (random.random(taken.sum()) * np.repeat(taken, taken)).astype(np.int64)
+    donors: Integers = again[start + (random.random(len(many)) * many).astype(np.int64)]
+    return donors
+
+
+def replicas(sample: Sample, values: Floats, count: int) -> Iterator[Floats]:
+    """Changes that make the values of the units of ``left`` those of other samples like this one, (units left, k) each.
+
+    A bootstrap within strata, and for each unit left the miss of one unit of it at random: totals then vary as those
+    of samples do, and single units as units do.
+
+    Parameters
+    ----------
+    sample : Sample
+    values : ndarray, (units that ran, k), float64
+    count : int
+    """
+    fit, plain = _fit(sample, values), _donors(sample)
+    few = np.repeat(np.sqrt(sample.taken / np.maximum(sample.taken - 1, 1)), sample.taken)[:, None]
+    wide = np.repeat(fit.mean, sample.taken, axis=0) + fit.apart * few
+    for replica in range(count):
+        yield wide[_donors(sample, np.random.default_rng(replica))] - fit.residual[plain]

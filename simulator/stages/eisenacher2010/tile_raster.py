@@ -34,6 +34,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     count_block,
     count_stores,
 )
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_known import known_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
@@ -44,7 +45,6 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     sample_quad,
     sample_span,
 )
-from tilestamp.simulator.stages.eisenacher2010.tile_sizes import tile_sizes
 from tilestamp.simulator.work import Work
 
 Edges = Literal["computed", "loaded"]
@@ -179,7 +179,7 @@ def _work(
     )
 
 
-@divisible(known=tile_sizes, work=_work)
+@divisible(known=known_tiles, work=_work)
 def tile_raster(
     vertices: NDArray[np.float32],
     count: NDArray[np.uint32],

@@ -14,7 +14,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.stage import divisible
+from tilestamp.simulator.stage import Known, divisible
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
@@ -190,10 +190,10 @@ def _tile_sizes(
     width: int,
     height: int,
     **_: Any,
-) -> tuple[NDArray[Any], ...]:
+) -> Known:
     """Length of the list of each active tile, and the area of the triangles in it; inputs of ``fine_raster``."""
     area = tile_areas(setup, tile_starts, tile_entries, width, height)
-    return np.diff(tile_starts)[active_tiles], area[active_tiles]
+    return Known(np.diff(tile_starts)[active_tiles], (area[active_tiles],))
 
 
 def _work(
