@@ -102,7 +102,7 @@ def loads(asked: Asked) -> Loads:
         sms=max(1, int(np.count_nonzero(places))),
         interval=asked.terms["start"] / max(1, len(sm)),
         start=machine.latency.block_launch_cycles if blocks else 0.0,
-        chip=max(asked.terms["dram"], asked.terms["l2"]) + atomic,
+        chip=min(max(asked.terms["dram"], asked.terms["l2"]) + atomic, float(units.alone.mean()) if len(sm) else 0.0),
     )
 
 
