@@ -4,7 +4,7 @@ Every launch is priced by its roofline first, and ``models.fidelity_bound`` prov
 It stays there when that is within the requested error of its own time. Of the others, those stay too that matter least:
 from the smallest possible gap upwards, while all gaps together stay within the requested error of the frame. So a
 small launch may be off by more than the error asked for (its row says by how much), the frame may not. The rest is
-played on the SMs, and each launch says why.
+scheduled, and each launch says why.
 """
 
 from collections.abc import Sequence
@@ -78,11 +78,7 @@ class _Rough:
         self.units: Loads = loads(self.asked)
         self.timing = roofline(self.asked)
         roof = longest(self.asked.terms, self.asked.units)
-        latest = latest_end(self.units)
-        end = max(roof, latest.cycles + start_up(self.asked))
-        self.most = self.asked.terms["launch"] + end
-        tail = latest.tail > (end - roof) / 2
-        self.cause = "few units" if not latest.waiting else "tail" if tail else "terms compete"
+        self.most = self.asked.terms["launch"] + max(roof, latest_end(self.units) + start_up(self.asked))
 
     def stay(self, error: float, frame: float) -> Timing:
         """Keep the roofline."""
@@ -94,8 +90,7 @@ class _Rough:
         return replace(self.timing, why=why, error_bound=bound)
 
     def escalate(self) -> Timing:
-        """Play it."""
+        """Schedule it."""
         assert self.asked is not None  # noqa: S101 - a pipe has no gap, so it stays
         bound = 1.0 - self.timing.cycles / self.most
-        why = f"{self.cause}: bounds up to {bound:.0%} low"
-        return replace(played(self.asked, self.units), why=why, error_bound=0.0)
+        return replace(played(self.asked, self.units), why=f"bounds up to {bound:.0%} low", error_bound=0.0)

@@ -112,8 +112,11 @@ def slots(launch: Launch, machine: Machine, held: Residency) -> np.ndarray[tuple
     return dealt * (-(-launch.block // machine.sm.warp_size) if launch.dispatch == "warp_queue" else 1)
 
 
-def timing(asked: Asked, cycles: float, bound: str, fidelity: str, **details: float) -> Timing:
-    """Put a result together."""
+def timing(
+    asked: Asked, cycles: float, bound: str, fidelity: str, spread: tuple[float, float] | None = None, **details: float
+) -> Timing:
+    """Put a result together; ``spread`` is the lowest and the highest that ``cycles`` may be."""
+    low, high = (edge / asked.machine.clock_hz * 1e3 for edge in spread or (cycles, cycles))
     return Timing(
         stage=asked.launch.stage,
         kernel=asked.launch.kernel,
@@ -126,4 +129,6 @@ def timing(asked: Asked, cycles: float, bound: str, fidelity: str, **details: fl
         l2_bytes=asked.moved.l2_bytes,
         details={"resident_blocks": float(asked.held.blocks)} | details,
         fidelity=fidelity,
+        low=low,
+        high=high,
     )

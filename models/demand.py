@@ -29,6 +29,7 @@ from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import Traffic
 
 Cycles = NDArray[np.float64]
+WHOLE_SECTORS = 16  # that a warp instruction can fill: 32 lanes of 16 bytes
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,24 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
 
 
 def _l1_cycles(events: Cycles, machine: Machine) -> Cycles:
-    """Cycles of the SM's load and store path: stores may be slower than loads."""
+    """Cycles of the SM's load and store path: stores and what lies scattered may be slower than whole lines."""
     memory = machine.memory
-    stores = events[:, E.STORE_BYTES] / (memory.l1_write_bytes_per_clock or memory.l1_bytes_per_clock)
-    cycles: Cycles = events[:, E.LOAD_BYTES] / memory.l1_bytes_per_clock + stores
-    return cycles
+    line = WHOLE_SECTORS * memory.l2_line_bytes
+    write = memory.l1_write_bytes_per_clock or memory.l1_bytes_per_clock
+    loads = _line_cycles(
+        events[:, E.LOAD_BYTES],
+        line * events[:, E.LOAD],
+        memory.l1_bytes_per_clock,
+        memory.l1_gather_bytes_per_clock,
+    )
+    stores = _line_cycles(events[:, E.STORE_BYTES], line * events[:, E.STORE], write, memory.l1_scatter_bytes_per_clock)
+    return loads + stores
+
+
+def _line_cycles(bytes_moved: Cycles, lines: Cycles, rate: float, scattered: float) -> Cycles:
+    """Cycles of bytes of which ``lines`` may lie in whole lines, a line a warp instruction; the rest is scattered."""
+    slower = max(0.0, 1.0 / (scattered or rate) - 1.0 / rate)
+    return bytes_moved / rate + np.maximum(0.0, bytes_moved - lines) * slower
 
 
 def _l2_cycles(moved: Traffic, machine: Machine) -> float:
@@ -144,24 +158,23 @@ def _chain(launch: Launch, machine: Machine, moved: Traffic) -> Cycles:
 
 def _atomic(events: Cycles, machine: Machine) -> Cycles:
     """Cycles of all atomic units together."""
-    conflict_cycles = machine.atomics.conflict_ns * machine.clock_hz * 1e-9
-    requests = events[:, E.ATOMIC_REQUESTS] / _request_rate(events, machine)
-    return requests + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
+    atomics = machine.atomics
+    conflict_cycles = atomics.conflict_ns * machine.clock_hz * 1e-9
+    rate = _rate(events, atomics.requests_per_clock, atomics.unawaited_per_clock)
+    return events[:, E.ATOMIC_REQUESTS] / rate + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
 
 
 def _sent(events: Cycles, machine: Machine) -> Cycles:
     """Cycles in which the SM of a unit sends its atomic requests."""
-    if machine.atomics.place != "l2_unit":
-        return np.zeros(len(events))
-    sent: Cycles = events[:, E.ATOMIC_REQUESTS] * (machine.sm.count / _request_rate(events, machine))
+    atomics = machine.atomics
+    awaited = atomics.sm_requests_per_clock or atomics.requests_per_clock
+    sent: Cycles = events[:, E.ATOMIC_REQUESTS] / _rate(events, awaited, atomics.sm_unawaited_per_clock)
     return sent
 
 
-def _request_rate(events: Cycles, machine: Machine) -> float:
-    """Requests in a clock of all SMs together; more where nobody waits for the value returned."""
-    atomics = machine.atomics
-    unawaited = atomics.unawaited_per_clock and not events[:, E.CHAIN_ATOMIC].any()
-    return atomics.unawaited_per_clock if unawaited else atomics.requests_per_clock
+def _rate(events: Cycles, awaited: float, unawaited: float) -> float:
+    """Requests in a clock; there may be more where nobody waits for the value returned (0: there are not)."""
+    return unawaited if unawaited and not events[:, E.CHAIN_ATOMIC].any() else awaited
 
 
 def _fullest_queue(launch: Launch, machine: Machine) -> float:

@@ -96,7 +96,9 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bank_lanes: Count
     bank_pass_cycles: Positive  # one pass of one group of bank_lanes
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
-    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
+    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores of whole lines; 0: the same
+    l1_gather_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for the scattered sectors of a load; 0: the same
+    l1_scatter_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for scattered sectors; 0: the same
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -110,6 +112,8 @@ class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     requests_per_clock: Positive  # all units together, at different addresses
     conflict_ns: Amount  # further time of the whole memory system for a lane that an earlier lane of its warp blocks
     unawaited_per_clock: Amount = 0.0  # as requests_per_clock, where no value is returned; 0: the same
+    sm_requests_per_clock: Amount = 0.0  # what one SM sends; 0: not known, as much as all units together take
+    sm_unawaited_per_clock: Amount = 0.0  # as sm_requests_per_clock, where no value is returned; 0: the same
 
 
 class Launching(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,41 +1,48 @@
-"""Schedule: units of work played against each other on the SMs.
+"""Schedule: when units of work start, who is in whose way, and how long the last ones take.
 
-The machine hands units to SMs in order: a block to the SM with the most free places, not faster than the block launch
-rate; an item of a queue to whichever persistent block or warp is free. What is resident shares:
+The machine hands units to places in order: to the place that is free first, a block not sooner than the block launch
+rate allows. A unit takes its place until three things are over:
 
-*An SM.* A unit that would take ``alone`` cycles by itself and needs ``d`` cycles of its SM (schedulers, execution
-units, shared memory, load path: the largest) loads the SM by ``d / alone``. While the loads of all residents add up
-to S <= 1, each runs at its own pace; beyond, all of them slow down by S. So an SM has a clock of its own that runs at
-1 / max(1, S), and a unit ends when that clock has advanced by ``alone``.
+*Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want the SM at the
+same time for at most the smaller of its own work there and theirs, and of two that want the same each goes first as
+often as the other. So half of the smaller is waited for. Neighbours' work is that of all units, less the longest one of
+each SM, a share an SM.
 
-*The chip.* DRAM, L2, all atomic units and the fullest one are servers of the whole chip. Each unit loads them in the
-same way; while the fullest is loaded by C > 1, everything slows down by C. So time itself is stretched by
-max(1, C), and events need no second look.
+*Its SM.* Schedulers, execution units, shared memory and load path (the fullest) serve units in order, as many at a time
+as there are SMs. A block's first request comes a block start after it got its place.
 
-Both loads change only when a unit starts or ends, so the play is exact and costs one step for each unit. It shows
-what a roofline cannot: idle SMs when units are few, SMs that are half empty, and the tail when units are unlike.
+*What it draws from.* An item of a queue begins when the draws before it have passed the fullest atomic unit.
+
+Memory and atomic units of the whole chip are shared by all. While they are not what holds, half of their time is added,
+by the same reasoning: a launch is in step with itself, and its units want them together.
+
+So the time is a sum, a maximum or the lowest of a list of costs all the way: **no cost that falls makes it longer, and
+a cost that changes by 1 % changes it by at most 1 %** (it is monotone, and of the first degree in all costs together).
+One more SM or place only adds an entry to the lists. Two residents can be in each other's way where one could not, so
+the time is never above that of one resident an SM. Equal units take whole rounds (``ceil(units / places)``): that step
+is real, and it softens as units differ.
+
+The halves are expectations. ``low`` and ``high`` are the times at which nobody or everybody is in the way.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.bounds import Asked, asked_of, longest, slots, timing
-from tilestamp.models.demand import Demand
-from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch
+from tilestamp.models.list_schedule import list_schedule
 from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
 
-MOST_UNITS = 1_000_000  # beyond, neighbours are played as one unit
-SERVERS = 4  # of the whole chip: DRAM, L2, atomic units together, the fullest atomic unit
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
+IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often as the other
 
 
 def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
-    """Price one launch by playing its units on the SMs; parameters and errors as of ``asked_of``.
+    """Price one launch by its units' starts and ends; parameters and errors as of ``asked_of``.
 
     Returns
     -------
@@ -48,36 +55,55 @@ def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
 
 
 class Loads(NamedTuple):
-    """What is played: a row a unit.
+    """What the units of a launch load the machine with; arrays have a row a unit, in cycles.
 
     Parameters
     ----------
     sm : ndarray, (units,)
-        Cycles of its SM.
-    chip : ndarray, (units, SERVERS)
-        Cycles of the servers of the chip.
+        Of its SM.
     alone : ndarray, (units,)
-        Cycles that it takes by itself.
-    places : ndarray, (sms,)
-        Units that each SM holds.
+        What it takes by itself.
+    draws : ndarray, (units,)
+        Of the fullest atomic unit, where units are drawn from a queue; else of length 0.
+    places : int
+        Units that the machine holds together.
+    sms : int
+        SMs that get any.
     interval : float
         Cycles from one start to the next; 0 where units are drawn from a queue.
+    start : float
+        Cycles from a free place to the first instruction of the block put there; 0 where units are drawn.
+    chip : float
+        Cycles of the fuller of DRAM and L2, and of the atomic units.
     """
 
     sm: NDArray[np.float64]
-    chip: NDArray[np.float64]
     alone: NDArray[np.float64]
-    places: NDArray[np.int64]
+    draws: NDArray[np.float64]
+    places: int
+    sms: int
     interval: float
+    start: float
+    chip: float
 
 
 def loads(asked: Asked) -> Loads:
     """What the units of a launch load the machine with."""
-    launch, machine = asked.launch, asked.machine
-    sm, chip, alone = _grouped(asked.units)
+    launch, machine, units = asked.launch, asked.machine, asked.units
     blocks = launch.dispatch == "blocks"
-    interval = machine.sm.clock_mhz / machine.launch.blocks_per_us * launch.grid / max(1, len(alone)) if blocks else 0.0
-    return Loads(sm, chip, alone, slots(launch, machine, asked.held), interval)
+    places = slots(launch, machine, asked.held)
+    sm = np.maximum(np.maximum(units.issue, units.shared), units.l1)
+    atomic = asked.terms["atomic"] if not blocks else max(asked.terms["atomic"], asked.terms["queue"])
+    return Loads(
+        sm=sm,
+        alone=np.maximum(np.maximum(units.alone, sm), 1.0),
+        draws=np.empty(0) if blocks else units.queue,
+        places=int(places.sum()),
+        sms=max(1, int(np.count_nonzero(places))),
+        interval=asked.terms["start"] / max(1, len(sm)),
+        start=machine.latency.block_launch_cycles if blocks else 0.0,
+        chip=min(max(asked.terms["dram"], asked.terms["l2"]) + atomic, float(units.alone.mean()) if len(sm) else 0.0),
+    )
 
 
 def start_up(asked: Asked) -> float:
@@ -87,18 +113,52 @@ def start_up(asked: Asked) -> float:
 
 
 def played(asked: Asked, units: Loads) -> Timing:
-    """Play the units of what was asked."""
-    end, last_start, busy = _play(*units)
-    terms = asked.terms
-    cycles = max(end + start_up(asked), longest(terms, asked.units))
+    """Price what was asked."""
+    terms, begun = asked.terms, start_up(asked)
+    least = longest(terms, asked.units)
+    end, started, waited = ends(units)
+    waited += IN_THE_WAY * units.chip
+    cycles = max(begun + end + IN_THE_WAY * units.chip, least)
+    tail = max(0.0, cycles - begun - started)
     return timing(
         asked,
         terms["launch"] + cycles,
-        _holds(terms, cycles, end - last_start, busy < asked.machine.sm.count),
+        _holds(terms, cycles, tail, units.sms < asked.machine.sm.count),
         "schedule",
-        busy_sms=float(busy),
-        tail_cycles=end - last_start,
+        (terms["launch"] + max(least, cycles - waited), terms["launch"] + cycles + waited),
+        busy_sms=float(min(len(units.alone), units.sms)),
+        tail_cycles=tail,
     )
+
+
+def ends(units: Loads) -> tuple[float, float, float]:
+    """Cycles to the end of the last unit and to its start; how many of them it and those before it wait for others."""
+    extra = crowd(units)
+    crowded = _ends(units, units.alone + extra, units.places)
+    last = crowded[2]
+    waited = float(extra[last : last + 1].sum() + extra[:last].sum() / units.places)
+    if waited and units.alone.sum() / units.sms < crowded[0]:
+        lonely = _ends(units, units.alone, units.sms)
+        if lonely[0] < crowded[0]:
+            return lonely[0], lonely[1], 0.0
+    return crowded[0], crowded[1], waited
+
+
+def _ends(units: Loads, alone: NDArray[np.float64], places: int) -> tuple[float, float, int]:
+    result: tuple[float, float, int] = list_schedule(
+        units.sm, alone, units.draws, places, units.sms, units.interval, units.start
+    )
+    return result
+
+
+def crowd(units: Loads) -> NDArray[np.float64]:
+    """Cycles that each unit waits for its neighbours."""
+    count, sms = len(units.sm), units.sms
+    if min(count, units.places) <= sms:
+        return np.zeros(count)
+    neighbours = np.partition(units.sm, count - sms)[: count - sms].sum() / sms
+    waited: NDArray[np.float64] = IN_THE_WAY * np.minimum(units.sm, neighbours)
+    return waited
 
 
 def _holds(terms: dict[str, float], played: float, tail: float, some_idle: bool) -> str:
@@ -112,141 +172,3 @@ def _holds(terms: dict[str, float], played: float, tail: float, some_idle: bool)
     if some_idle:
         return "balance"
     return "tail" if tail > (played - roof) / 2 else largest
-
-
-def _grouped(asked: Demand) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Cycles on the SM (units,), on the chip (units, SERVERS), and alone (units,); neighbours added where too many."""
-    sm = np.maximum(np.maximum(asked.issue, asked.shared), asked.l1)
-    chip = np.stack((asked.dram, asked.l2, asked.atomic, asked.queue), axis=1)
-    alone = np.maximum(np.maximum(asked.alone, sm), 1.0)
-    group = -(-len(alone) // MOST_UNITS)
-    if group > 1:
-        first = np.arange(0, len(alone), group)
-        sm, chip, alone = (np.add.reduceat(column, first, axis=0) for column in (sm, chip, alone))
-    return np.ascontiguousarray(sm), np.ascontiguousarray(chip), np.ascontiguousarray(alone)
-
-
-@kernel
-def _play(sm: Any, chip: Any, alone: Any, places: Any, interval: float) -> tuple[float, float, int]:
-    """Play all units; return the end, the start of the last unit (cycles), and the SMs that got any.
-
-    ``ends[s, p]`` is the reading of SM s's own clock at which the unit in place p ends, infinite where it is free;
-    ``soonest[s]`` is the place of the first one, ``vacancies[s]`` a stack of its ``free[s]`` free places.
-    ``now`` is unstretched time, ``time`` is real; ``wake[s]`` is the ``now`` of the next end on SM s, and ``first``
-    a tournament tree over it.
-    """
-    sms = len(places)
-    ends = np.full((sms, max(1, places.max())), np.inf)
-    unit = np.zeros(ends.shape, np.int64)
-    free = places.copy()
-    vacancies = np.zeros(ends.shape, np.int64)
-    for each in range(sms):
-        vacancies[each, : places[each]] = np.arange(places[each])[::-1]
-    soonest = np.zeros(sms, np.int64)
-    load = np.zeros(sms)  # S of each SM
-    clock = np.zeros(sms)  # its own clock, at ``read``
-    read = np.zeros(sms)
-    leaves = 1 << int(np.ceil(np.log2(max(2, sms))))
-    wake = np.full(leaves, np.inf)
-    first = _tournament(leaves)
-    server = np.zeros((sms, SERVERS))  # what the units of an SM load the chip with, at their own pace
-    chip_load = np.zeros(SERVERS)
-    vacant = free.sum()
-    time = 0.0
-    now = 0.0
-    last_start = 0.0
-    started = 0
-    ended = 0
-    freed = 0  # SM of the last end
-    while ended < len(alone):
-        stretch = max(1.0, chip_load[0], chip_load[1], chip_load[2], chip_load[3])
-        s = first[1]
-        moment = wake[s]
-        start = False
-        if started < len(alone) and vacant > 0:
-            ready = now + max(0.0, started * interval - time) / stretch
-            start = ready <= moment
-            moment = min(ready, moment)
-        time += (moment - now) * stretch
-        now = moment
-        if start:
-            s = freed if vacant == free[freed] else np.argmax(free)
-        # the SM's own clock up to now, before its load changes
-        clock[s] += (now - read[s]) / max(1.0, load[s])
-        read[s] = now
-        if start:
-            place = vacancies[s, free[s] - 1]
-            i = started
-            ends[s, place] = clock[s] + alone[i]
-            if ends[s, place] < ends[s, soonest[s]]:
-                soonest[s] = place
-            unit[s, place] = i
-            started += 1
-            last_start = time
-            _change(s, i, 1.0, sm, chip, alone, load, server, chip_load)
-            free[s] -= 1
-            vacant -= 1
-        else:
-            place = soonest[s]
-            i = unit[s, place]
-            ends[s, place] = np.inf
-            soonest[s] = _next_end(ends, s, places[s])
-            vacancies[s, free[s]] = place
-            ended += 1
-            _change(s, i, -1.0, sm, chip, alone, load, server, chip_load)
-            free[s] += 1
-            vacant += 1
-            freed = s
-        if free[s] == places[s]:  # empty: leave no rounding behind
-            load[s] = 0.0
-        left = ends[s, soonest[s]] - clock[s]
-        wake[s] = now + max(0.0, left) * max(1.0, load[s])
-        _replay(first, wake, leaves, s)
-    return time, last_start, min(len(alone), int(np.count_nonzero(places)))
-
-
-@kernel
-def _change(
-    s: int, i: int, sign: float, sm: Any, chip: Any, alone: Any, load: Any, server: Any, chip_load: Any
-) -> None:
-    """Add (or take away) unit i to the loads of SM s and of the chip."""
-    before = 1.0 / max(1.0, load[s])
-    pace = sign / alone[i]
-    load[s] = max(0.0, load[s] + pace * sm[i])
-    after = 1.0 / max(1.0, load[s])
-    for k in range(SERVERS):
-        loaded = max(0.0, server[s, k] + pace * chip[i, k])
-        chip_load[k] += loaded * after - server[s, k] * before
-        server[s, k] = loaded
-
-
-@kernel
-def _next_end(ends: Any, s: int, places: int) -> int:
-    """Place of SM s whose unit ends first."""
-    best = 0
-    for p in range(1, places):
-        if ends[s, p] < ends[s, best]:
-            best = p
-    return best
-
-
-@kernel
-def _tournament(leaves: int) -> Any:
-    """Tree over equal leaves: ``first[1]`` is the winner, the lowest leaf wins a tie."""
-    first = np.zeros(2 * leaves, np.int64)
-    for leaf in range(leaves):
-        first[leaves + leaf] = leaf
-    for node in range(leaves - 1, 0, -1):
-        first[node] = first[2 * node]
-    return first
-
-
-@kernel
-def _replay(first: Any, wake: Any, leaves: int, s: int) -> None:
-    """Settle again the games of leaf s, after ``wake[s]`` changed."""
-    node = (leaves + s) >> 1
-    while node > 0:
-        left = first[2 * node]
-        right = first[2 * node + 1]
-        first[node] = right if wake[right] < wake[left] else left
-        node >>= 1

@@ -24,6 +24,9 @@ class Timing:
         What else a fidelity has to say: ``busy_sms``, ``tail_cycles``, ``resident_blocks``.
     fidelity : str
         The level that priced it; under ``auto`` the one that was chosen.
+    low, high : float
+        Milliseconds between which units that are in each other's way less or more often than expected put the launch
+        (see ``models.schedule``); the same number where nothing spreads. It is no error of the model.
     why : str
         Why ``auto`` chose it.
     error_bound : float
@@ -42,6 +45,8 @@ class Timing:
     l2_bytes: float
     details: dict[str, float] = field(default_factory=dict)
     fidelity: str = ""
+    low: float = float("nan")
+    high: float = float("nan")
     why: str = ""
     error_bound: float = float("nan")
 

@@ -1,4 +1,4 @@
-"""Schedule: units of work played on the SMs, against rooflines and against what must be so."""
+"""Schedule: times of launches against rooflines and against what must be so."""
 
 from dataclasses import replace
 
@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models import schedule as module
 from tilestamp.models.bounds import bounds
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
@@ -179,13 +178,6 @@ def test_blocks_that_end_faster_than_they_start_leave_places_free_on_many_sms():
     got = schedule(launch(4096, CHAIN_ALU=work), H200, NOTHING)
     longest = work.max() * H200.latency.alu_cycles
     assert longest < work_cycles(got) < 4 * longest
-
-
-def test_units_beyond_the_most_are_played_in_groups(monkeypatch):
-    what = launch(5000, FP32=1000)
-    exact = schedule(what, GTX280, NOTHING)
-    monkeypatch.setattr(module, "MOST_UNITS", 2500)
-    assert schedule(what, GTX280, NOTHING).cycles == pytest.approx(exact.cycles, rel=0.02)
 
 
 def test_a_launch_without_work_is_all_overhead():

@@ -1,0 +1,80 @@
+"""List scheduling: units in order, each to the place that is free first; plain numbers in, plain numbers out.
+
+Every time is a sum, a maximum or the soonest of earlier times, so the end is monotone and of the first degree in all
+costs together (``models.schedule`` says why that matters). A step costs a replay in each of two tournaments.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from tilestamp.models.kernel import kernel
+
+
+@kernel
+def list_schedule(
+    sm: Any, alone: Any, draws: Any, places: int, sms: int, interval: float, start: float
+) -> tuple[float, float, int]:
+    """End of all units; the start and the index of the one that ends last.
+
+    ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before.
+    """
+    units = len(alone)
+    free, free_who = tournament(places if units > places else 1)
+    served, served_who = tournament(min(sms, units))
+    drawn = end = last_start = 0.0
+    last = 0
+    for i in range(units):
+        begun = i * interval
+        if i >= places:
+            begun = max(begun, free[0])
+        done = max(served[0], begun + start) + sm[i]
+        replay(served, served_who, done)
+        begin = begun
+        if len(draws) > 0:
+            drawn = max(drawn, begun) + draws[i]
+            begin = drawn
+        done = max(done, begin + alone[i])
+        if done > end:
+            end, last_start, last = done, begun, i
+        if units > places:
+            replay(free, free_who, done)
+    return end, last_start, last
+
+
+@kernel
+def tournament(players: int) -> Any:
+    """Times of ``players`` that meet in a tournament: the winner's, which is the soonest, and each game's loser's.
+
+    ``times[0]`` and ``who[0]`` are the winner's; game ``g`` is played by the winners of games ``2 g`` and ``2 g + 1``.
+    """
+    leaves = 1
+    while leaves < players:
+        leaves *= 2
+    times = np.zeros(leaves)
+    who = np.zeros(leaves, np.int64)
+    for game in range(1, leaves):  # all times are 0: let the left win everywhere, so the right loses
+        leaf = 2 * game + 1
+        while leaf < leaves:
+            leaf *= 2
+        who[game] = leaf - leaves
+        if leaf - leaves >= players:
+            times[game] = np.inf
+    return times, who
+
+
+@kernel
+def replay(times: Any, who: Any, time: float) -> None:
+    """Give the winner a later time, and play its games again."""
+    winner = who[0]
+    game = (winner + len(times)) >> 1
+    while game > 0:
+        other, loser = times[game], who[game]
+        beaten = other < time
+        times[game] = time if beaten else other
+        who[game] = winner if beaten else loser
+        time = other if beaten else time
+        winner = loser if beaten else winner
+        game >>= 1
+    times[0] = time
+    who[0] = winner
