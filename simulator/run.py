@@ -15,7 +15,7 @@ from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
 from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
-from tilestamp.models.traffic import traffic
+from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
@@ -152,9 +152,13 @@ class Run:
 
     def _price(self, index: int, timing: Timing) -> Callable[[Launch], float]:
         """How a launch in place of the ``index``-th is priced, bytes as they are."""
-        moved = traffic(self.launches, self.machine)[index]
         level = schedule if timing.fidelity == "schedule" else bounds
-        return lambda launch: level(launch, self.machine, moved).milliseconds
+        return lambda launch: level(launch, self.machine, self._traffic[index]).milliseconds
+
+    @cached_property
+    def _traffic(self) -> list[Traffic]:
+        """Bytes of each launch."""
+        return traffic(self.launches, self.machine)
 
     @cached_property
     def counts_interval(self) -> dict[str, Estimate]:

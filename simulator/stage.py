@@ -49,6 +49,8 @@ class Known(NamedTuple):
 
     Parameters
     ----------
+    seconds : float
+        CPU time of all units, about (measured on two cores of a server): where it is short a sample does not pay.
     size : ndarray
         The work that it will be, up to a factor.
     more : tuple of ndarray
@@ -57,6 +59,7 @@ class Known(NamedTuple):
         By event (a column of the work table): what follows from the inputs alone.
     """
 
+    seconds: float
     size: NDArray[Any]
     more: tuple[NDArray[Any], ...] = ()
     exact: Mapping[int, NDArray[np.int64]] = {}

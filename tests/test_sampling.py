@@ -23,7 +23,7 @@ MICRO = {"width": 320, "height": 240, "bound": 3}
 @pytest.fixture
 def small_frames(monkeypatch):
     """Sample frames that are too small to be worth it."""
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.SMALLEST", 1)
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
 
 
 def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
-SMALLEST = 100_000  # sizes of all units together, list entries; below, a sample and its price cost more than it saves
+PAYS = 0.5  # seconds of a stage, from which on drawing and pricing a sample takes less than half of it
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -59,6 +59,12 @@ class Part:
         self.sample = replace(self.sample, taken=taken, rows=table[new])
         self.seconds += time.process_time() - begin
 
+    @property
+    def seconds_of_all(self) -> float:
+        """CPU seconds that all units would take, if they cost alike by size."""
+        size = self.sample.strata.known[:, 1]
+        return self.seconds * float(size.sum() / size[drawn(self.sample.strata, self.sample.taken)].sum())
+
     def work(self) -> Work:
         """Work of all units: as they ran, or as those that ran foretell."""
         work: Work = self.stage.work(expanded(self.sample), **self.inputs)
@@ -82,13 +88,14 @@ class SampledExecutor(Executor):
         super().__init__(picture=False)
         self.error, self.seed, self.pipeline, self.machine = error, seed, pipeline, machine
         self.parts: dict[int, Part] = {}  # by place among the works
+        self.spent = 0.0  # CPU seconds on samples: their units, and what is made of them
         self.too_small = False  # a stage could run in part, and was too small to
 
     def last(self, stage: Divisible[P, T], *inputs: P.args, **options: P.kwargs) -> StageResult[T]:
         """Run part of a stage's units: enough that all that the run asks for is known within the error."""
-        named = stage.inputs(*inputs, **options)
+        begin, named = time.process_time(), stage.inputs(*inputs, **options)
         known = stage.known(**named)
-        if known.size.sum() < SMALLEST:
+        if known.seconds < PAYS:
             self.too_small = True
             return self(stage, *inputs, **options)
         strata = make_strata(known.size, [self.seed, len(self.parts)], *known.more)
@@ -102,6 +109,7 @@ class SampledExecutor(Executor):
             part.grow(enlarged(part.sample, measured, self.error) if left else strata.units)
         self.parts[len(self.works)] = part
         self.works.append(part.work())
+        self.spent += time.process_time() - begin
         return StageResult(part.outputs, (self.works[-1],))
 
     def _measures(self, part: Part) -> Floats:
@@ -116,14 +124,16 @@ class SampledExecutor(Executor):
 
     def finished(self, index: int) -> Work:
         """Run all units of the stage whose work stands at ``index``, of which part ran."""
-        part = self.parts[index]
+        begin, part = time.process_time(), self.parts[index]
         part.grow(part.sample.strata.units)
-        return part.work()
+        work = part.work()
+        self.spent += time.process_time() - begin
+        return work
 
     @property
     def seconds_saved(self) -> float:
-        """CPU seconds by which running parts of stages was quicker than running them in full, estimated."""
-        return 0.0
+        """CPU seconds that all units would have taken, had they cost alike by size, less those of the samples."""
+        return sum(part.seconds_of_all for part in self.parts.values()) - self.spent
 
     @property
     def units(self) -> dict[str, tuple[int, int]]:

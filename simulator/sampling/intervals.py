@@ -14,6 +14,7 @@ from tilestamp.simulator.sampling.totals import left, replicas, totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 Price = Callable[[Launch], float]
+MARGIN = 1.1  # of counts: few units of a skewed count say too little of its spread (by 300 seeds of teapot and spot)
 REPLICAS = 8  # samples like the one drawn, whose times are compared
 
 
@@ -39,7 +40,7 @@ def count_intervals(work: Work | FixedFunctionWork) -> dict[str, Estimate]:
     counts = work.counts()
     if not isinstance(work, Work) or work.sample is None:
         return {name: exactly(count) for name, count in counts.items()}
-    half = totals(work.sample, work.sample.sampled.astype(np.float64)).half_width
+    half = MARGIN * totals(work.sample, work.sample.sampled.astype(np.float64)).half_width
     return {event.name: around(counts[event.name], half[event]) for event in work.events}
 
 
@@ -49,7 +50,7 @@ def instructions(work: Work, launch: Launch, sampled: Launch | None) -> Estimate
     if sampled is None or work.sample is None:
         return exactly(value)
     ran = sampled.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1, keepdims=True)
-    return around(value, float(totals(work.sample, ran).half_width[0]))
+    return around(value, MARGIN * float(totals(work.sample, ran).half_width[0]))
 
 
 def milliseconds(timing: Timing, work: Any, launch: Launch, sampled: Launch | None, price: Price) -> Estimate:

@@ -15,8 +15,8 @@ from tilestamp.simulator.sampling.estimate import Floats, Integers
 CERTAIN = 24  # largest units, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum
 FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
-PILOT = 96  # units that the first sample draws in proportion to size, and ...
-PILOT_EACH = 5  # ... at least from each stratum
+PILOT = 200  # units that the first sample draws in proportion to size, and ...
+PILOT_EACH = 10  # ... at least from each stratum
 
 
 @dataclass(frozen=True)

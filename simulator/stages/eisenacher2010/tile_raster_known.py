@@ -23,6 +23,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     count_stores,
 )
 
+SAMPLE_SECONDS, ENTRY_SECONDS = 40e-9, 0.4e-6  # CPU time of a sample, and of an entry of a list
 _PART_TILES = 256  # that one call of the worker takes, at least
 _E = TileRasterEvent
 LISTED = (  # events that follow from the lists
@@ -86,4 +87,5 @@ def known_tiles(
     parts, listed = parts_of(tiles.total, _PART_TILES), (count, start, lists, tiles)
     for_parts(_add_grids, parts, vertices, *listed, pixels)
     for_parts(_count_lists, parts, *listed, shape, block_traffic(shape, simt), (width, height), rows)
-    return Known(count, (pixels[1], pixels[0]), {event: rows[:, event] for event in LISTED})
+    seconds = SAMPLE_SECONDS * width * height * spp + ENTRY_SECONDS * len(lists)
+    return Known(seconds, count, (pixels[1], pixels[0]), {event: rows[:, event] for event in LISTED})

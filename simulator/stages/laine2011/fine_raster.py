@@ -49,6 +49,7 @@ MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colou
 }
 START_LOADS = 3  # of a warp that starts: whether a buffer was too small
 DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
+SAMPLE_SECONDS, ENTRY_SECONDS = 50e-9, 1e-6  # CPU time of a sample, and of an entry of a tile's list
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
 
 
@@ -189,11 +190,21 @@ def _tile_sizes(
     active_tiles: NDArray[np.int32],
     width: int,
     height: int,
+    samples: int,
     **_: Any,
 ) -> Known:
     """Length of the list of each active tile, and the area of the triangles in it; inputs of ``fine_raster``."""
-    area = tile_areas(setup, tile_starts, tile_entries, width, height)
-    return Known(np.diff(tile_starts)[active_tiles], (area[active_tiles],))
+    E, entries = FineRasterEvent, np.diff(tile_starts)[active_tiles]
+    area = tile_areas(setup, tile_starts, tile_entries, width, height)[active_tiles]
+    segments, partial = -(-entries // SEGMENT), (entries % SEGMENT > 0).astype(np.int64)
+    listed: dict[int, NDArray[Any]] = {
+        E.SEGMENTS: segments,
+        E.LIST_WARPS: segments,
+        E.PARTIAL_SEGMENTS: partial,
+        E.ENTRY_LANES: entries,
+    }
+    seconds = SAMPLE_SECONDS * len(entries) * PIXELS * samples + ENTRY_SECONDS * int(entries.sum())
+    return Known(seconds, entries, (area,), listed)
 
 
 def _work(
