@@ -1,8 +1,7 @@
 """A run: the picture, what each stage did, how long it would take, and how sure each number is."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,8 @@ from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
-from tilestamp.simulator.sampling.estimate import Estimate
+from tilestamp.simulator.sampling.estimate import Estimate, Floats
+from tilestamp.simulator.sampling.totals import left
 from tilestamp.simulator.stage_table import interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
@@ -139,7 +139,7 @@ class Run:
         if isinstance(work, Work) and isinstance(launch, Launch):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)
-            known["milliseconds"] = intervals.milliseconds(timing, work, launch, ran, self._price(index, timing))
+            known["milliseconds"] = intervals.milliseconds(timing, work, partial(self._changed, index))
         else:
             known["milliseconds"] = intervals.exactly(timing.milliseconds)
         return known
@@ -150,10 +150,20 @@ class Run:
             return None
         return self._launch(replace(work, table=work.sample.sampled, streams=(), atomic_requests=None))
 
-    def _price(self, index: int, timing: Timing) -> Callable[[Launch], float]:
-        """How a launch in place of the ``index``-th is priced, bytes as they are."""
-        level = schedule if timing.fidelity == "schedule" else bounds
-        return lambda launch: level(launch, self.machine, self._traffic[index]).milliseconds
+    def _changed(self, index: int, change: Floats) -> float:
+        """Milliseconds of the ``index``-th launch, were the rows of its units that did not run others."""
+        work, launch, moved = self.frame.works[index], self.launches[index], self._traffic[index]
+        assert isinstance(work, Work) and isinstance(launch, Launch) and work.sample is not None  # noqa: S101, PT018
+        events, rest = launch.events.copy(), left(work.sample)
+        priced = self._launch(replace(work, table=change, streams=()))  # type: ignore[arg-type]  # events are linear
+        events[rest] = np.maximum(events[rest] + priced.events, 0.0)
+        launch = replace(launch, events=events)
+        if work.sample.streams is not None:
+            launch = replace(launch, streams=work.sample.streams(change.sum(axis=0)))
+            launches = [*self.launches[:index], launch, *self.launches[index + 1 :]]
+            moved = traffic(launches, self.machine)[index]
+        level = schedule if self.timings[index].fidelity == "schedule" else bounds
+        return level(launch, self.machine, moved).milliseconds
 
     @cached_property
     def _traffic(self) -> list[Traffic]:

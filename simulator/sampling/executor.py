@@ -2,12 +2,14 @@
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from tilestamp.models.demand import demand
 from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.launch import Stream
 from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import Traffic
 from tilestamp.simulator.executor import Executor
@@ -19,6 +21,7 @@ from tilestamp.simulator.stage import Divisible, StageResult
 from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
+BYTES = ("LOAD_BYTES", "STORE_BYTES")
 MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
 PAYS = 0.5  # seconds of a stage, from which on drawing and pricing a sample takes less than half of it
 
@@ -67,8 +70,16 @@ class Part:
 
     def work(self) -> Work:
         """Work of all units: as they ran, or as those that ran foretell."""
-        work: Work = self.stage.work(expanded(self.sample), **self.inputs)
-        return replace(work, sample=self.sample)
+        rows = expanded(self.sample)
+        work: Work = self.stage.work(rows, **self.inputs)
+        known = {work.events(event).name for event in self.sample.exact}
+        streams = None if known.issuperset(BYTES) else partial(self._streams, rows.sum(axis=0))
+        return replace(work, sample=replace(self.sample, streams=streams))
+
+    def _streams(self, totals: Integers, change: Floats) -> tuple[Stream, ...]:
+        """Buffers touched by units of other totals: as of one unit that does all."""
+        work: Work = self.stage.work((totals + change).astype(np.int64)[None], **self.inputs)
+        return work.streams
 
 
 class SampledExecutor(Executor):

@@ -1,20 +1,17 @@
 """Intervals of a run: what its samples say of each stage and of the frame."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.sampling.estimate import Estimate, t_quantile
-from tilestamp.simulator.sampling.totals import left, replicas, totals
+from tilestamp.simulator.sampling.estimate import Estimate, Floats, t_quantile
+from tilestamp.simulator.sampling.totals import replicas, totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
-Price = Callable[[Launch], float]
-MARGIN = 1.1  # of counts: few units of a skewed count say too little of its spread (by 300 seeds of teapot and spot)
+LEAST = 5e-4  # of a time: no half-width below it is claimed, for single units beside the longest weigh more than others
 REPLICAS = 8  # samples like the one drawn, whose times are compared
 
 
@@ -40,7 +37,7 @@ def count_intervals(work: Work | FixedFunctionWork) -> dict[str, Estimate]:
     counts = work.counts()
     if not isinstance(work, Work) or work.sample is None:
         return {name: exactly(count) for name, count in counts.items()}
-    half = MARGIN * totals(work.sample, work.sample.sampled.astype(np.float64)).half_width
+    half = totals(work.sample, work.sample.sampled.astype(np.float64)).half_width
     return {event.name: around(counts[event.name], half[event]) for event in work.events}
 
 
@@ -50,29 +47,24 @@ def instructions(work: Work, launch: Launch, sampled: Launch | None) -> Estimate
     if sampled is None or work.sample is None:
         return exactly(value)
     ran = sampled.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1, keepdims=True)
-    return around(value, MARGIN * float(totals(work.sample, ran).half_width[0]))
+    return around(value, float(totals(work.sample, ran).half_width[0]))
 
 
-def milliseconds(timing: Timing, work: Any, launch: Launch, sampled: Launch | None, price: Price) -> Estimate:
-    """Time of one launch, as sure as the times of samples like this one are alike.
+def milliseconds(timing: Timing, work: Work, price: Callable[[Floats], float]) -> Estimate:
+    """Time of one launch: as sure as the times of samples like this one are alike.
 
     Parameters
     ----------
     timing : Timing
     work : Work
-    launch : Launch
-        All units, estimated.
-    sampled : Launch or None
-        The units that ran; None where all did.
     price : callable
-        Milliseconds of a launch with other events.
+        Milliseconds, were the rows of the units that did not run changed by (units, events).
     """
-    if sampled is None or not np.isfinite(timing.milliseconds):
+    sample = work.sample
+    if sample is None or sample.complete or not np.isfinite(timing.milliseconds):
         return exactly(timing.milliseconds)
-    rest, squares = left(work.sample), 0.0
-    for change in replicas(work.sample, sampled.events, REPLICAS):
-        events = launch.events.copy()
-        events[rest] = np.maximum(events[rest] + change, 0.0)
-        squares += (price(replace(launch, events=events)) - timing.milliseconds) ** 2
-    quantile = float(t_quantile(np.array(REPLICAS))[()])
-    return around(timing.milliseconds, quantile * float(np.sqrt(squares / REPLICAS)))
+    changes = replicas(sample, sample.sampled.astype(np.float64), REPLICAS)
+    square = np.mean([(price(change) - timing.milliseconds) ** 2 for change in changes])
+    quantile = t_quantile(np.full(1, REPLICAS, np.float64))[0]
+    half = max(float(quantile * np.sqrt(square)), LEAST * timing.milliseconds)
+    return around(timing.milliseconds, half)

@@ -3,13 +3,14 @@
 The largest units are a certainty stratum: they always run, so that the schedule sees the worst imbalance as it is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.launch import Stream
 from tilestamp.simulator.sampling.estimate import Floats, Integers
 
 CERTAIN = 24  # largest units, always executed
@@ -66,12 +67,15 @@ class Sample:
         Of the units ``drawn(strata, taken)``.
     exact : dict of int to ndarray, (units,)
         Columns of the rows that are known of all units.
+    streams : callable or None
+        Buffers touched, had the totals of all rows another (events,) added; None where what is known says which.
     """
 
     strata: Strata
     taken: Integers
     rows: Integers
     exact: Mapping[int, Integers] = field(default_factory=dict)
+    streams: Callable[[Floats], tuple[Stream, ...]] | None = None
 
     @property
     def sampled(self) -> Integers:
