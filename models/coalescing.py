@@ -9,7 +9,7 @@ HALF_WARP_SEGMENTS      1.2 and 1.3. Each half-warp by itself: take the 128-byte
                         while one half alone is used, down to 32 bytes; repeat.
 WARP_LINES              2.x and 3.x through L1. Distinct 128-byte lines of the warp; 8-byte words go as two requests
                         (half-warps), 16-byte words as four (quarter-warps).
-WARP_SECTORS            7.x and later. Distinct 32-byte sectors of the warp.
+WARP_SECTORS            5.x and later. Distinct 32-byte sectors of the warp (CUDA 11 guide, K.4.2).
 ======================  ==============================================================================================
 
 Everywhere in this package an instruction is an int64 array with the byte address of each lane, **negative where the

@@ -59,6 +59,8 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             bank_lanes=self.memory.bank_lanes,
             atomic_merge=int(AtomicMerge[self.atomics.merge.upper()]),
             sms=self.sm.count,
+            bank_bytes=self.memory.bank_bytes,
+            bank_mode_bytes=self.memory.bank_mode_bytes,
         )
 
     @property
@@ -211,6 +213,9 @@ def _check_sense(machine: Machine, file: str) -> None:
             memory.bank_lanes > sm.warp_size
         ),
         "warp_size may be at most 64": sm.warp_size > 64,
+        f"words of {memory.bank_mode_bytes} bytes do not fit banks of {memory.bank_bytes}": (
+            memory.bank_mode_bytes > memory.bank_bytes
+        ),
         "an L2 without l2_bytes_per_clock or latency.l2_cycles": (
             memory.l2_bytes > 0 and (memory.l2_bytes_per_clock == 0 or machine.latency.l2_cycles == 0)
         ),
@@ -222,5 +227,8 @@ def _check_sense(machine: Machine, file: str) -> None:
 
 
 def _nearest(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=1)
+    def distance(other: str) -> tuple[float, bool]:  # of two as near, the one that begins alike: gtx280 for gtx290
+        return -difflib.SequenceMatcher(None, other, word).ratio(), other[:4] != word[:4]
+
+    near = sorted(difflib.get_close_matches(word, known), key=distance)
     return f" (did you mean {near[0]!r}?)" if near else ""

@@ -37,6 +37,9 @@ class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shared_bytes: Size
     shared_unit_bytes: Count
     reserved_shared_bytes: Size  # that the system takes from every block
+    registers_per_block: Size = 0  # that one block may have; 0: all of the SM's
+    shared_bytes_per_block: Size = 0  # that one block may ask for; 0: all of the SM's but those reserved
+    block_warp_granularity: Size = 0  # to which a block's warps are rounded against registers_per_block; 0: as the SM's
 
 
 class Issue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -95,6 +98,8 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     banks: Count
     bank_lanes: Count
     bank_pass_cycles: Positive  # one pass of one group of bank_lanes
+    bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
+    bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores of whole lines; 0: the same
     l1_gather_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for the scattered sectors of a load; 0: the same

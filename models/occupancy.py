@@ -1,15 +1,20 @@
 """Occupancy: how many blocks of a launch live on one SM together, and what keeps out one more.
 
 A block takes a place, warps, threads, registers and shared memory of its SM, each in the allocation units of its
-compute capability (CUDA 4.2 guide, section 4.2). Registers come in one piece for the block on 1.x
-(``ceil(ceil(warps, granularity) * 32 * registers, unit)``) and by warp from 2.0 on
-(``ceil(32 * registers, unit)`` for each warp, and an SM grants a multiple of the granularity).
+compute capability (CUDA 4.2 guide, section 4.2; the rules of ``cuda_occupancy.h``, CUDA 7.0 to 13). Registers come in
+one piece for the block on 1.x (``ceil(ceil(warps, granularity) * 32 * registers, unit)``) and by warp from 2.0 on:
+``ceil(32 * registers, unit)`` for each warp. An SM has as many parts as the granularity, with as many warps in each as
+fit, and a launch is refused where the block, its warps rounded up to all parts, exceeds the registers of a block.
+
+On 3.7, 5.3 and 6.2, where an SM has more registers than a block may have, the older spreadsheet deals an SM in shares
+of a block's size and allows fewer blocks; this follows the header, which is what the driver answers.
 """
 
 from dataclasses import dataclass
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine
+from tilestamp.models.machine_parts import Sm
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ def residency(machine: Machine, block: int, registers: int, shared_bytes: int) -
         A block that the machine cannot launch, naming what exceeds.
     """
     sm = machine.sm
-    warps = _round_up(block, sm.warp_size) // sm.warp_size
+    warps = _warps(sm, block)
     _check_launch(machine, block, registers, shared_bytes)
     register_blocks = _blocks_by_registers(machine, warps, registers)
     shared = _round_up(shared_bytes + sm.reserved_shared_bytes, sm.shared_unit_bytes)
@@ -85,7 +90,14 @@ def _check_launch(machine: Machine, block: int, registers: int, shared_bytes: in
         raise TilestampError(
             f"{machine.name} has at most {sm.max_registers_per_thread} registers a thread, not {registers}"
         )
+    warps = _round_up(_warps(sm, block), sm.block_warp_granularity or sm.warp_granularity)
+    most = sm.registers_per_block or sm.registers
+    if sm.register_allocation == "warp" and warps * _of_a_warp(sm, registers) > most:
+        raise TilestampError(
+            f"{machine.name} gives a block at most {most} registers, too few for {block} threads with {registers} each"
+        )
     most = sm.shared_bytes - sm.reserved_shared_bytes
+    most = min(most, sm.shared_bytes_per_block or most)
     if shared_bytes > most:
         raise TilestampError(f"{machine.name} gives a block at most {most} bytes of shared memory, not {shared_bytes}")
 
@@ -98,9 +110,17 @@ def _blocks_by_registers(machine: Machine, warps: int, registers: int) -> int:
     if sm.register_allocation == "block":
         granted = _round_up(warps, sm.warp_granularity)
         return sm.registers // _round_up(granted * sm.warp_size * registers, sm.register_unit)
-    per_warp = _round_up(sm.warp_size * registers, sm.register_unit)
-    allotted = sm.registers // per_warp // sm.warp_granularity * sm.warp_granularity
+    allotted = sm.registers // sm.warp_granularity // _of_a_warp(sm, registers) * sm.warp_granularity
     return allotted // warps
+
+
+def _warps(sm: Sm, block: int) -> int:
+    return -(-block // sm.warp_size)
+
+
+def _of_a_warp(sm: Sm, registers: int) -> int:
+    """Registers that a warp is allotted, from 2.0 on."""
+    return _round_up(sm.warp_size * registers, sm.register_unit)
 
 
 def _round_up(value: int, unit: int) -> int:

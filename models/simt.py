@@ -9,7 +9,7 @@ class Coalescing(IntEnum):
 
     HALF_WARP_SEGMENTS = 1  # compute capability 1.2, 1.3: half-warps, 128-byte segments that shrink to 64 and 32 bytes
     WARP_LINES = 2  # 2.x, 3.x: 128-byte lines through L1
-    WARP_SECTORS = 3  # 7.x and later: 32-byte sectors of 128-byte lines
+    WARP_SECTORS = 3  # 5.x and later: 32-byte sectors of 128-byte lines
 
 
 class AtomicMerge(IntEnum):
@@ -28,3 +28,5 @@ class Simt(NamedTuple):
     bank_lanes: int = 32  # lanes that access shared memory together: a half-warp (16) on 1.x
     atomic_merge: int = AtomicMerge.SECTOR
     sms: int = 132  # persistent kernels launch this many blocks
+    bank_bytes: int = 4  # that a bank of shared memory serves a pass: 8 on 3.x
+    bank_mode_bytes: int = 4  # consecutive words of this size lie in consecutive banks: 4 or 8 on 3.x

@@ -12,7 +12,9 @@ from tilestamp.models.simt import Coalescing, Simt
 from tilestamp.simulator.scenes import LookAt, load_scene
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
-from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent
+from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import _works as snap_works
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)
 VIEW = LookAt((1.0, -5.0, 2.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 40.0, 0.1, 50.0)
@@ -151,6 +153,50 @@ def test_a_half_warp_dices_a_patch_in_whole_segments():
     # 16 points of 16 bytes are two segments of 128 bytes, and the entry one of 32; then two of vertices and the box
     assert work.total(DiceEvent.LOAD_TRANSACTIONS) == 17 * 3
     assert work.total(DiceEvent.STORE_BYTES) == 17 * (256 + 32)
+
+
+def sectors_of_a_block(patches):
+    """32-byte sectors that the warps of one block touch: the points of two sub-patches, and their queue entries."""
+    sectors = 0
+    for first in range(0, len(patches), 2):
+        pair = patches[first : first + 2]
+        sectors += len({(16 * patch + point) * 16 // 32 for patch in pair for point in range(16)}) + 1
+    return sectors
+
+
+def test_a_warp_loads_the_sectors_that_it_touches_once():
+    """Queue neighbours are mostly of one urPatch, and a warp holds two of them."""
+    patches = np.sort(np.random.default_rng(3).integers(0, 12, 77)).astype(np.int32)
+    table = dice_work(patches, 12, False, Simt()).table
+    expected = [sectors_of_a_block(patches[first : first + 16].tolist()) for first in range(0, 77, 16)]
+    assert table[:, DiceEvent.LOAD_TRANSACTIONS].tolist() == expected
+    assert (table[:, DiceEvent.LOAD_BYTES] == 32 * np.array(expected)).all()
+
+
+@pytest.mark.parametrize(("patches", "sectors"), [([5, 5], 8 + 1), ([5, 6], 16 + 1), ([5], 8 + 1), ([5, 6, 6], 26)])
+def test_two_half_warps_share_the_sectors_of_one_patch(patches, sectors):
+    work = dice_work(np.array(patches, np.int32), 8, False, Simt())
+    assert work.total(DiceEvent.LOAD_TRANSACTIONS) == sectors
+
+
+@pytest.mark.parametrize(("together", "sectors"), [(1, 136_000), (2, 72_000), (3, 93_336)])
+def test_loads_are_those_that_an_h200_counts(together, sectors):
+    """Read by ncu on an H200: 16,000 sub-patches, so many of one patch in a row; queue entry and control points."""
+    work = dice_work((np.arange(16_000) // together).astype(np.int32), 16_000, False, Simt())
+    assert work.total(DiceEvent.LOAD_TRANSACTIONS) == sectors
+
+
+def test_snapping_dices_again_the_sub_patches_that_it_touches():
+    patch = np.array([0, 1, 1, 2, 2, 2, 3], np.int32)
+    touched = np.array([0, 1, 0, 1, 0, 1, 0], np.bool_)
+    again = snap_works(Snapped(None, touched, np.ones(7, np.int64)), patch, 4, Simt(), textured=False)[1]
+    assert again.total(DiceEvent.LOAD_TRANSACTIONS) == (16 + 1) + (8 + 1)  # 1 and 2 in a warp, then 2 alone
+
+
+@pytest.mark.parametrize("simt", [GTX280, Simt(coalescing=Coalescing.WARP_LINES)])
+def test_rules_that_serve_parts_of_a_warp_share_nothing(simt):
+    same, other = (dice_work(np.array(patches, np.int32), 8, False, simt) for patches in ([5, 5], [5, 6]))
+    assert same.total(DiceEvent.LOAD_TRANSACTIONS) == other.total(DiceEvent.LOAD_TRANSACTIONS)
 
 
 def test_no_sub_patches_are_no_grids():

@@ -4,9 +4,11 @@ import re
 
 import pytest
 
+from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import FOLDER, altered, list_machines, load_machine
 from tilestamp.models.simt import AtomicMerge, Coalescing
+from tilestamp.simulator.pipelines import pipeline_names
 
 
 @pytest.fixture
@@ -32,6 +34,42 @@ def test_every_number_has_a_source(name):
 @pytest.mark.parametrize("name", list(list_machines()))
 def test_a_machine_bears_the_name_of_its_file(name):
     assert load_machine(name).name == name
+
+
+CARDS = {
+    "gtx980": "5.2",
+    "gtx1080": "6.1",
+    "rtx2080ti": "7.5",
+    "a100": "8.0",
+    "rtx3080": "8.6",
+    "rtx4090": "8.9",
+    "b200": "10.0",
+    "rtx5090": "12.0",
+}
+
+
+@pytest.mark.parametrize(("name", "capability"), CARDS.items())
+def test_there_is_a_card_of_each_generation(name, capability):
+    assert load_machine(name).compute_capability == capability
+
+
+@pytest.mark.parametrize("name", CARDS)
+@pytest.mark.parametrize("pipeline", pipeline_names())
+def test_a_card_prices_every_pipeline(name, pipeline):
+    run = simulate("teapot", pipeline, name, width=48, height=36, picture=False)
+    assert 0.0 < run.milliseconds < 10.0
+
+
+def test_a_newer_card_draws_a_frame_sooner():
+    order = ["gtx980", "gtx1080", "rtx3080", "rtx4090"]
+    times = [simulate("teapot", "micropolygon", name, width=320, height=240).milliseconds for name in order]
+    assert times == sorted(times, reverse=True)
+
+
+def test_words_of_eight_bytes_in_banks_of_four_are_refused(edited):
+    extra = 'bank_mode_bytes = { value = 8, provenance = "assumed", source = "test" }'
+    with pytest.raises(TilestampError, match="words of 8 bytes do not fit banks of 4"):
+        load_machine(edited("banks = {", f"{extra}\nbanks = {{"))
 
 
 def test_a_number_keeps_its_provenance():

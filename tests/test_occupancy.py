@@ -2,8 +2,9 @@
 
 import pytest
 
+from tests.naive_occupancy import LIMITS, K, resident_blocks
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.machine import altered, list_machines, load_machine
 from tilestamp.models.occupancy import residency
 
 
@@ -81,3 +82,79 @@ def test_a_smaller_register_file_never_holds_more():
     machine = load_machine("h200")
     half = altered(machine, {"sm.registers": 32768}, "assumed", "test")
     assert residency(half, 256, 40, 0).blocks <= residency(machine, 256, 40, 0).blocks
+
+
+THREADS = (1, 32, 33, 64, 96, 128, 160, 192, 224, 256, 320, 384, 480, 512, 544, 640, 672, 704, 768, 896, 1000, 1024)
+REGISTERS = (1, 8, 10, 16, 17, 20, 21, 24, 31, 32, 33, 40, 46, 48, 56, 63, 64, 72, 80, 88, 96, 104, 124, 128, 160, 255)
+SHARED = tuple(
+    int(kilobytes * K)
+    for kilobytes in (0, 1 / K, 0.5, 1, 3, 4, 6, 8, 12, 15.9, 16, 24, 32.1, 48, 49, 64, 96, 99, 100, 112, 163, 227, 228)
+)
+
+
+def described(name):
+    """A machine with the published limits of a compute capability."""
+    limits = LIMITS[name]
+    numbers = {
+        "max_warps": limits.warps,
+        "max_threads": limits.warps * 32,
+        "max_blocks": limits.blocks,
+        "max_threads_per_block": limits.block_threads,
+        "registers": limits.registers,
+        "registers_per_block": limits.block_registers,
+        "register_unit": limits.register_unit,
+        "register_allocation": "block" if name.startswith("1.") else "warp",
+        "warp_granularity": limits.parts,
+        "block_warp_granularity": limits.block_parts,
+        "max_registers_per_thread": limits.thread_registers,
+        "shared_bytes": limits.shared,
+        "shared_bytes_per_block": limits.block_shared,
+        "shared_unit_bytes": limits.shared_unit,
+        "reserved_shared_bytes": limits.reserved,
+    }
+    changed = {f"sm.{key}": value for key, value in numbers.items()}
+    return altered(load_machine("h200"), changed, "published", "CUDA guide")
+
+
+def blocks_or_none(machine, *launch):
+    try:
+        return residency(machine, *launch).blocks
+    except TilestampError:
+        return 0
+
+
+@pytest.mark.parametrize("name", list(LIMITS))
+def test_blocks_of_a_compute_capability_are_the_published_ones(name):
+    machine = described(name)
+    wrong = [
+        (threads, registers, shared)
+        for threads in THREADS
+        for registers in REGISTERS
+        for shared in SHARED
+        if blocks_or_none(machine, threads, registers, shared) != resident_blocks(name, threads, registers, shared)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("name", list(list_machines()))
+def test_a_machine_file_has_the_limits_of_its_compute_capability(name):
+    machine = load_machine(name)
+    of_its_kind = described(machine.compute_capability)
+    launches = [
+        (threads, registers, shared) for threads in THREADS for registers in REGISTERS for shared in SHARED[::3]
+    ]
+    assert [blocks_or_none(machine, *launch) for launch in launches] == [
+        blocks_or_none(of_its_kind, *launch) for launch in launches
+    ]
+
+
+def test_a_block_on_maxwell_gets_half_of_the_shared_memory_that_an_sm_has():
+    assert residency(described("5.2"), 32, 16, 48 * K).blocks == 2
+    with pytest.raises(TilestampError, match="at most 49152 bytes of shared memory"):
+        residency(described("5.2"), 32, 16, 48 * K + 1)
+
+
+def test_a_block_on_gk210_gets_half_of_the_registers_that_an_sm_has():
+    assert residency(described("3.7"), 512, 128, 0).blocks == 2
+    with pytest.raises(TilestampError, match="at most 65536 registers"):
+        residency(described("3.7"), 544, 128, 0)

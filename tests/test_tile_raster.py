@@ -9,6 +9,7 @@ from numba import get_num_threads, set_num_threads
 from tests.diced_scenes import diced
 from tests.naive_tiles import naive_raster
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
@@ -16,6 +17,7 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as Event
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import block_shape, block_traffic
 
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 H200 = Simt()
@@ -182,3 +184,13 @@ def test_lanes_of_the_measured_scene(tile, spp, shared):
         "quad_sample_pairs_covered": works[0].total(Event.HIT_LANES),
     }
     assert ours == pytest.approx({metric: published[metric] for metric in ours}, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "replays"), [("gtx280", 30), ("gtx480", 3), ("gtx680", 1), ("gtx980", 3), ("h200", 3)]
+)
+def test_vectors_are_stored_by_the_banks_of_the_generation(name, replays):
+    """32 lanes of 16 bytes take 32, 4, 2, 4 and 4 passes, of which 2 or 1 are counted with the access itself."""
+    simt = load_machine(name).simt
+    shape = block_shape(8, 1, simt, box_tests=True, loaded=False)
+    assert block_traffic(shape, simt).gather_replays == replays

@@ -66,7 +66,9 @@ def device(sms: int) -> Iterator[Number]:
         "sm.max_threads_per_block": attribute("MaxThreadsPerBlock"),
         "sm.max_blocks": attribute("MaxBlocksPerMultiprocessor"),
         "sm.registers": attribute("MaxRegistersPerMultiprocessor"),
+        "sm.registers_per_block": attribute("MaxRegistersPerBlock"),
         "sm.shared_bytes": attribute("MaxSharedMemoryPerMultiprocessor"),
+        "sm.shared_bytes_per_block": attribute("MaxSharedMemoryPerBlockOptin"),
         "sm.reserved_shared_bytes": attribute("ReservedSharedMemoryPerBlock"),
         "memory.l2_bytes": attribute("L2CacheSize"),
     }.items():

@@ -212,5 +212,5 @@ def dice(
         colors,
         grids.boxes,
     )
-    works = (dice_work(number, len(points), texture is not None, simt),) if counting else ()
+    works = (dice_work(subpatches.patch, len(points), texture is not None, simt),) if counting else ()
     return StageResult(grids, works)

@@ -24,7 +24,7 @@ class DiceEvent(IntEnum):
     VERTEX_WARPS = 0  # warps that evaluate, shade and store a vertex a lane
     VERTEX_LANES = 1
     PATCHES = 2  # sub-patches
-    LOAD_TRANSACTIONS = 3  # queue entry, and each lane one control point of its patch into shared memory
+    LOAD_TRANSACTIONS = 3  # queue entry, and each lane one control point of its urPatch into shared memory
     LOAD_BYTES = 4
     STORE_TRANSACTIONS = 5  # vertices, and a box a sub-patch
     STORE_BYTES = 6
@@ -34,18 +34,29 @@ class DiceEvent(IntEnum):
 _E = DiceEvent
 
 
-def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
-    """Work of dicing: nothing depends on the data, but that the last block may be partly empty."""
-    per_block = BLOCK // VERTICES
+def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt) -> Work:
+    """Work of dicing: it depends on which neighbours in the queue share an urPatch, and on how full the last block is.
+
+    Parameters
+    ----------
+    patch : ndarray, (N,), int32
+        UrPatch of each sub-patch, in the order of the queue.
+    patches : int
+        UrPatches of the scene.
+    textured : bool
+    simt : Simt
+    """
+    number, per_block = len(patch), BLOCK // VERTICES
     grids = np.minimum(per_block, number - per_block * np.arange(-(-number // per_block)))
     table = np.zeros((len(grids), len(_E)), np.int64)
     table[:, _E.PATCHES] = grids
     table[:, _E.VERTEX_LANES] = grids * VERTICES
     table[:, _E.VERTEX_WARPS] = -(-grids * VERTICES // simt.warp)
     table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
+    table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = _points(patch, simt)
     for count in np.unique(grids):
-        loads, stores = _block_traffic(int(count), simt)
-        table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] = loads
+        queue, stores = _block_traffic(int(count), simt)
+        table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] += queue
         table[np.ix_(grids == count, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES])] = stores
     moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
     entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
@@ -67,18 +78,46 @@ def dice_work(number: int, patches: int, textured: bool, simt: Simt) -> Work:
     )
 
 
-def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Transactions and bytes of a block's loads, and of its stores.
+def _points(patch: NDArray[np.int32], simt: Simt) -> NDArray[np.int64]:
+    """Transactions and bytes of each block's loads of control points, (blocks, 2).
 
-    Half-warps read different patches, whose 256 bytes never share a segment with another patch.
+    A half-warp reads the 256 bytes of its urPatch. Mostly the rest of its warp reads the same ones: neighbours in the
+    queue come from one urPatch. So a warp touches the segments of as many urPatches as it has different ones.
     """
+    per_block, together = BLOCK // VERTICES, max(1, simt.warp // VERTICES)
+    blocks = -(-len(patch) // per_block)
+    padded = np.full(blocks * per_block, -1, np.int64)
+    padded[: len(patch)] = patch
+    warps = np.sort(padded.reshape(blocks * (per_block // together), together), axis=1)
+    different = (np.diff(warps, axis=1, prepend=-1) > 0).sum(axis=1)
+    cost = np.zeros((together + 1, together + 1, 2), np.int64)
+    for grids in range(1, together + 1):
+        for patches in range(1, grids + 1):
+            cost[grids, patches] = _warp_points(np.minimum(np.arange(grids), patches - 1), simt)
+    by_warp = cost[(warps >= 0).sum(axis=1), different].reshape(blocks, per_block // together, 2)
+    loads: NDArray[np.int64] = by_warp.sum(axis=1)
+    return loads
+
+
+def _warp_points(patch: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:
+    """Transactions and bytes of one warp's load of control points, 16 lanes a sub-patch."""
+    address = (patch[:, None] * VERTICES + np.arange(VERTICES)).reshape(-1) * POINT_BYTES
+    moved = np.zeros(2, np.int64)
+    for first in range(0, len(address), simt.warp):
+        lanes = min(simt.warp, len(address) - first)
+        moved += transactions(address[first:], lanes, POINT_BYTES, int(simt.coalescing))
+    return moved
+
+
+def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Transactions and bytes of a block's loads from the queue, and of its stores."""
     loads, stores = np.zeros(2, np.int64), np.zeros(2, np.int64)
     for first in range(0, grids * VERTICES, simt.warp):
         lanes = min(simt.warp, grids * VERTICES - first)
         lane = np.arange(first, first + lanes)
-        whole = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, int(simt.coalescing))
-        entry = transactions(lane // VERTICES * ENTRY_BYTES, lanes, ENTRY_BYTES, int(simt.coalescing))
+        entry = lane // VERTICES * ENTRY_BYTES
+        vertex = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, int(simt.coalescing))
         box = np.where(lane % VERTICES == 0, lane // VERTICES * BOX_BYTES, -1)
-        loads += np.add(whole, entry)
-        stores += np.add(whole, transactions(box, lanes, BOX_BYTES, int(simt.coalescing)))
+        loads += transactions(entry, lanes, ENTRY_BYTES, int(simt.coalescing))
+        stores += np.add(vertex, transactions(box, lanes, BOX_BYTES, int(simt.coalescing)))
     return loads, stores

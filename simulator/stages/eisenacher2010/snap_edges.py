@@ -109,16 +109,16 @@ def snap_edges(
                 touched[fine[known]] = True
                 fine, other, other_edge, along = (a[~known] for a in (fine, other, other_edge, along))
     snapped = Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
-    return StageResult(snapped, _works(snapped, len(points), simt, textured))
+    return StageResult(snapped, _works(snapped, subpatches.patch, len(points), simt, textured))
 
 
-def _works(snapped: Snapped, patches: int, simt: Simt, textured: bool) -> tuple[Work, ...]:
+def _works(snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, textured: bool) -> tuple[Work, ...]:
     if not snapped.touched.any():
         return ()
     starts = np.arange(0, len(snapped.touched), BLOCK)
     counts = np.stack([snapped.lookups, snapped.touched], axis=1).astype(np.int64)
     table = np.add.reduceat(counts, starts, axis=0)
-    again = dice_work(int(snapped.touched.sum()), patches, textured, simt)
+    again = dice_work(patch[snapped.touched], patches, textured, simt)
     return (
         Work(stage="snap_edges", kernel="snap_edges", events=SnapEvent, table=table, grid=len(starts), block=BLOCK),
         replace(again, stage="snap_edges"),

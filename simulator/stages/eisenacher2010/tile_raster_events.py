@@ -118,13 +118,9 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
         base += VERTICES * VECTOR_BYTES
         edges[grid] += transactions(lanes + base, EDGE_VECTORS - VERTICES, VECTOR_BYTES, shape.coalescing)
     full = min(shape.warp, shape.tile**2)
-    passes = 0  # wide accesses go word by word on 1.x, in groups that fill the banks once later
-    if shape.coalescing == _HALF_WARP:
-        passes = VECTOR_WORDS * bank_passes(np.arange(full) * VECTOR_WORDS, full, simt.banks, simt.bank_lanes)
-    gather = max(passes, -(-full * VECTOR_WORDS // simt.banks)) - -(-full // simt.bank_lanes)
-    resolved = 0
-    if shape.side > 1:
-        resolved = resolve_replays(shape.tile, shape.side, simt.warp, simt.banks, simt.bank_lanes)
+    shared = Simt(*map(int, simt))  # one type for the compiler
+    gather = bank_passes(np.arange(full) * VECTOR_WORDS, full, shared, VECTOR_WORDS) - -(-full // simt.bank_lanes)
+    resolved = resolve_replays(shape.tile, shape.side, shared) if shape.side > 1 else 0
     grid = transactions(lanes, VERTICES, VECTOR_BYTES, shape.coalescing)
     return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
 

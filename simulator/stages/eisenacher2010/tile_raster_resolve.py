@@ -36,21 +36,21 @@ def resolve(samples, side, x0, y0, image, depth, overdraw):
 
 
 @kernel
-def resolve_replays(tile, side, warp, banks, bank_lanes):
+def resolve_replays(tile, side, simt):
     """Further passes of one block's shared stores and loads in the resolve, from the words that each lane touches."""
     replays = 0
     threads = tile * tile
-    stored = np.empty(warp, np.int64)
-    loaded = np.empty(warp, np.int64)
-    for first in range(0, threads, warp):
-        lanes = min(warp, threads - first)
-        groups = (lanes + bank_lanes - 1) // bank_lanes
+    stored = np.empty(simt.warp, np.int64)
+    loaded = np.empty(simt.warp, np.int64)
+    for first in range(0, threads, simt.warp):
+        lanes = min(simt.warp, threads - first)
+        groups = (lanes + simt.bank_lanes - 1) // simt.bank_lanes
         for sample in range(side * side):
             j, i = sample // side, sample % side
             for lane in range(lanes):
                 y, x = (first + lane) // tile, (first + lane) % tile
                 stored[lane] = (y + j * tile) * side * tile + x + i * tile
                 loaded[lane] = (y * side + j) * side * tile + x * side + i
-            replays += bank_passes(stored, lanes, banks, bank_lanes) - groups
-            replays += bank_passes(loaded, lanes, banks, bank_lanes) - groups
+            replays += bank_passes(stored, lanes, simt) - groups
+            replays += bank_passes(loaded, lanes, simt) - groups
     return replays

@@ -1,0 +1,92 @@
+"""Which files are mutated, how often, and which tests have to notice."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.mutation.mutants import ROOT
+from tilestamp.simulator.pipelines import pipeline_names
+
+LEDGER = "tests/test_ledger.py"
+STAGES = {  # folder of stages: pipelines that run them
+    "eisenacher2010": ("micropolygon",),
+    "laine2011": ("cudaraster",),
+    "liu2010": ("freepipe",),
+    "fatahalian2009": ("stamps", "across-polygons"),
+    "yao2011": ("bit-mask",),
+    "ru2016": ("tiled", "per-primitive"),
+    "zhang2025": ("binned",),
+}
+
+
+@dataclass(frozen=True)
+class Room:
+    """Files of one kind.
+
+    Parameters
+    ----------
+    globs : tuple of str
+        The files, from the root.
+    number : int
+        Mutants that are drawn.
+    tests : callable
+        Arguments of pytest by the mutated file.
+    """
+
+    globs: tuple[str, ...]
+    number: int
+    tests: Callable[[str], list[str]]
+
+    def paths(self) -> list[str]:
+        """The files."""
+        found = {path for glob in self.globs for path in ROOT.glob(glob)}
+        return sorted(path.relative_to(ROOT).as_posix() for path in found)
+
+
+def _named(path: str) -> list[str]:
+    """Test files that bear the name of a module, or speak of it."""
+    module = Path(path).stem
+    dotted = path.removesuffix(".py").replace("/", ".")
+    files = sorted((ROOT / "tests").glob("test_*.py"))
+    chosen = [
+        file
+        for file in files
+        if module in file.stem or f"{dotted} " in (text := file.read_text()) or f"{dotted}\n" in text
+    ]
+    return [file.relative_to(ROOT).as_posix() for file in chosen if "packaging" not in file.name]
+
+
+def _ledger(*pipelines: str) -> list[str]:
+    return [f"{LEDGER}::test_counts_and_prices_of_small_frames_are_those_of_the_ledger[{name}]" for name in pipelines]
+
+
+def _of_mix(path: str) -> list[str]:
+    return _ledger(Path(path).parent.name)
+
+
+def _of_stage(path: str) -> list[str]:
+    return [*_ledger(*STAGES.get(Path(path).parent.name, pipeline_names())), *_named(path)]
+
+
+def _of_models(path: str) -> list[str]:
+    return [*_named(path), *_ledger("freepipe", "micropolygon", "binned", "hardware", "cudaraster", "tiled")]
+
+
+def _of_machine(path: str) -> list[str]:
+    return [
+        *_ledger("micropolygon", "cudaraster", "hardware", "freepipe", "binned"),
+        *_named(path),
+        "tests/test_machines.py",
+    ]
+
+
+ROOMS = {
+    "rules": Room(("models/*.py",), 90, _of_models),
+    "counters": Room(("simulator/stages/*/*.py", "simulator/stages/*.py"), 70, _of_stage),
+    "prices": Room(("simulator/mixes/*/*.toml",), 40, _of_mix),
+    "machines": Room(
+        tuple(f"models/machines/{name}.toml" for name in ("gtx280", "gtx480", "gtx680", "h200")), 20, _of_machine
+    ),
+    "drivers": Room(("simulator/stages/*/*.py", "simulator/*.py"), 40, _of_stage),
+    "reports": Room(("experiments/shared/*.py", "reports/*.py"), 30, _named),
+}
