@@ -38,7 +38,7 @@ def run_command(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0; 2 for bad input; 130 after Ctrl-C; 143 after SIGTERM.
+        0; 1 where an experiment failed; 2 for bad input; 130 after Ctrl-C; 143 after SIGTERM.
     """
     try:  # the imports too: they take a second in which a user may change his mind
         return _run(arguments)
@@ -60,11 +60,11 @@ def _run(arguments: list[str]) -> int:
     from tilestamp.models.errors import TilestampError
 
     try:
-        _app(arguments)(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        code = _app(arguments)(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except (TilestampError, CycloptsError) as error:
         sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}\n")
         return BAD_INPUT
-    return 0
+    return code if isinstance(code, int) else 0
 
 
 def _app(arguments: list[str]) -> "App":

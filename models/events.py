@@ -6,7 +6,15 @@ A column of instructions counts *warp* instructions.
 
 from enum import IntEnum
 
+from tilestamp.models.counters import count, shown
 
+
+@shown(
+    count("LOAD_TRANSACTIONS", "segments read from global memory"),
+    count("STORE_TRANSACTIONS", "segments written to global memory"),
+    count("ATOMIC_LANES", "global atomic operations", "atomics"),
+    count("ATOMIC_CONFLICTS", "of them at an address that an earlier lane of the instruction has"),
+)
 class MachineEvent(IntEnum):
     """Columns of a machine event table."""
 

@@ -19,6 +19,7 @@ import msgspec.structs
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.models.used import note
 
 FOLDER = Path(__file__).parent / "machines"
 Provenance = Literal["published", "measured", "derived", "fitted", "assumed"]
@@ -38,11 +39,14 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fixed_function: FixedFunction | None
     provenance: dict[str, tuple[Provenance, str]]  # "sm.count" -> kind, source
     digest: str  # of the numbers, for manifests
+    changes: dict[str, tuple[Any, Any]] = {}  # "sm.count" -> before, after; of a machine that was altered
+    file: str = ""  # of a machine that is not the package's, although it bears its name
 
     @property
     def name(self) -> str:
-        """Name of the machine."""
-        return self.identity.name
+        """Name of the machine, with what makes it another one: ``gtx280 (sm.count=60)``."""
+        marks = [self.file] * bool(self.file) + [f"{key}={value}" for key, (_, value) in self.changes.items()]
+        return f"{self.identity.name} ({', '.join(marks)})" if marks else self.identity.name
 
     @property
     def compute_capability(self) -> str:
@@ -93,14 +97,18 @@ def list_machines() -> dict[str, str]:
     return {file.stem: tomllib.loads(file.read_text("utf-8"))["identity"]["description"] for file in files}
 
 
-def load_machine(name_or_path: str | Path) -> Machine:
-    """Read a machine by its name, or from a file of the user's.
+def load_machine(name_or_path: str | Path | Machine) -> Machine:
+    """Read a machine by its name, or from a file of the user's; a Machine is given back.
 
     Raises
     ------
     TilestampError
         No such machine or file; a key that is unknown, missing or out of range; numbers that contradict each other.
     """
+    if isinstance(name_or_path, Machine):
+        return name_or_path
+    if not isinstance(name_or_path, str | Path):
+        raise TilestampError(f"a machine is a Machine, a name or a machine file, not {name_or_path!r}")
     path = Path(name_or_path)
     if path.suffix != ".toml":
         path = FOLDER / f"{name_or_path}.toml"
@@ -113,9 +121,14 @@ def load_machine(name_or_path: str | Path) -> Machine:
         table = tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
         raise TilestampError(f"cannot read the machine file {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # no TOML, no text or no path
         raise TilestampError(f"{path} is not a TOML file: {error}") from error
-    return _build(table, str(path))
+    machine = _build(table, str(path))
+    shipped = FOLDER / f"{machine.name}.toml"
+    if shipped.is_file() and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
+        machine = msgspec.structs.replace(machine, file=f"{path.name}, digest {machine.digest}")
+    note("machines", machine.name, machine.digest)
+    return machine
 
 
 def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance, source: str) -> Machine:
@@ -130,6 +143,7 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
         What the new numbers are, and where they come from.
     """
     table = msgspec.to_builtins(machine)
+    changes = dict(machine.changes)
     for key, value in values.items():
         *path, last = key.split(".")
         section = table
@@ -137,10 +151,16 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
             section = section.get(step) or {}
         if last not in section:
             raise TilestampError(f"{key!r} is no number of a machine{_nearest(key, list(machine.provenance))}")
+        before = changes.pop(key, (section[last],))[0]
         section[last] = value
+        if value != before:
+            changes[key] = before, value
     sections = {key: table[key] for key in SECTIONS if table.get(key) is not None}
     origins = machine.provenance | dict.fromkeys(values, (provenance, source))
-    return _convert(sections, origins, machine.name)
+    marks = {"changes": changes, "file": machine.file}
+    changed = msgspec.structs.replace(_convert(sections, origins, machine.name), **marks)
+    note("machines", changed.name, changed.digest)
+    return changed
 
 
 def _build(table: dict[str, Any], file: str) -> Machine:

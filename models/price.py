@@ -13,6 +13,7 @@ from tilestamp.models.occupancy import residency
 from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic, traffic
+from tilestamp.models.used import note
 
 Fidelity = Literal["counts", "bounds", "auto", "schedule"]
 FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "auto", "schedule")
@@ -46,6 +47,7 @@ def price(
     """
     if fidelity not in FIDELITIES:
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
+    note("machines", machine.name, machine.digest)
     moved = traffic(launches, machine)
     if fidelity == "auto":
         return auto(launches, machine, moved, error)

@@ -1,6 +1,6 @@
 """A frame: what a pipeline made, before anything is priced."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,17 +9,12 @@ from numpy.typing import NDArray
 
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
-REMARKS = {  # a fact that counts what was lost, repeated or left to chance: the sentence about it
-    "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn",
-    "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
-    "wrong_pixels": "{:,} pixels show another micropolygon than without the mask",
-    "retries": "{:,} attempts of a first frame fail for want of room in a queue (-O first_frame=True prices them)",
-    "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows hangs on the packing",
-    "mixed_pixels": "{:,} pixels mix the halves of two triangles' colours",
-    "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
-    "fragments lost beyond the kept ones": "{:,} fragments beyond those that a pixel can keep are lost",
-    "fragments beyond the stream's room": "{:,} fragments find no room in the original's stream",
-}
+NOTHING = "nothing is visible: all of it is off screen, nearer or farther than the camera sees, culled or without area"
+
+
+def remarks(sentences: Mapping[str, str], facts: Mapping[str, Any]) -> tuple[str, ...]:
+    """Say what was lost, repeated or left to chance: a sentence for each of some facts that counts any."""
+    return tuple(sentence.format(facts[fact]) for fact, sentence in sentences.items() if facts.get(fact))
 
 
 @dataclass(frozen=True)
@@ -31,7 +26,7 @@ class Frame:
     image : ndarray, (H, W, 3), uint8
         Row 0 is the top row. Without pixels where only numbers were asked for: ``numbers``.
     depth : ndarray, (H, W)
-        In the pipeline's own format (float32, or the original's uint32).
+        In the pipeline's own format: float32, 1 where nothing was drawn, or the original's uint32.
     works : sequence of Work or FixedFunctionWork
         One for each kernel launch.
     triangle_ids : ndarray, (H, W), int32, or None
@@ -60,12 +55,23 @@ class Frame:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """The warnings, and a sentence for each fact that says of something lost, repeated or left to chance."""
-        return self.warnings + tuple(
-            sentence.format(self.facts[fact]) for fact, sentence in REMARKS.items() if self.facts.get(fact)
-        )
+        """The warnings, and whether there is nothing to be seen."""
+        return ((NOTHING,) if self.shows_nothing else ()) + self.warnings
+
+    @property
+    def shows_nothing(self) -> bool:
+        """Whether no pixel shows anything of the scene; without a picture, whether no sample was hit."""
+        if self.triangle_ids is not None:
+            return not (self.triangle_ids >= 0).any()
+        if self.depth.size and self.depth.dtype == np.float32:
+            return not (self.depth != 1).any()
+        hits = [work.counts()["SAMPLE_HITS"] for work in self.works if "SAMPLE_HITS" in work.counts()]
+        return bool(hits) and not any(hits)
 
     @classmethod
-    def numbers(cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any] | None = None) -> "Frame":
+    def numbers(
+        cls, works: Sequence[Work | FixedFunctionWork], facts: dict[str, Any], warnings: tuple[str, ...] = ()
+    ) -> "Frame":
         """Make a frame of which only the numbers were asked for."""
-        return cls(np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32), works, facts=facts or {})
+        nothing = np.empty((0, 0, 3), np.uint8)
+        return cls(nothing, np.empty((0, 0), np.float32), works, facts=facts, warnings=warnings)

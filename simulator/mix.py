@@ -17,6 +17,7 @@ An event that bears the name of a machine event needs no table: it passes throug
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
 """
 
+import hashlib
 import tomllib
 from dataclasses import dataclass
 from enum import IntEnum
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.launch import Launch
+from tilestamp.models.used import note
 from tilestamp.simulator.work import Work
 
 MIXES = Path(__file__).parent / "mixes"
@@ -97,6 +99,7 @@ class Mix:
 
     name: str
     kernels: dict[str, KernelMix]
+    digest: str  # of the file
 
     def launch(self, work: Work, warp: int) -> Launch:
         """Price a work table in machine events.
@@ -107,6 +110,7 @@ class Mix:
         warp : int
             Lanes in a warp of the machine.
         """
+        note("mixes", self.name, self.digest)
         kernel = self.kernels.get(f"{work.kernel}: {work.variant}") or self.kernels.get(work.kernel)
         if kernel is None:
             raise TilestampError(f"the mix {self.name} has no kernel {work.kernel}")
@@ -134,9 +138,10 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
         No mix, an unknown column, or a number without provenance.
     """
     path = _path_for(pipeline, int(float(compute_capability)))
-    tables = tomllib.loads(path.read_text())
+    text = path.read_text("utf-8")
     name = f"{pipeline}/{path.stem}"
-    return Mix(name, {kernel: _kernel_mix(name, kernel, table) for kernel, table in tables.items()})
+    kernels = {kernel: _kernel_mix(name, kernel, table) for kernel, table in tomllib.loads(text).items()}
+    return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
 
 
 def _path_for(pipeline: str, major: int) -> Path:

@@ -12,13 +12,17 @@ import textwrap
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
 from msgspec import inspect as types
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+
+if TYPE_CHECKING:
+    from tilestamp.simulator.work import Work
 
 MOST = 2**31  # kernels take 32-bit numbers
 LARGEST = float(np.finfo(np.float32).max)
@@ -31,6 +35,10 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
         for field in msgspec.structs.fields(self):
             value = checked(field.name, field.type, getattr(self, field.name))
             msgspec.structs.force_setattr(self, field.name, value)
+
+    def launches(self, simt: Simt) -> list["Work"]:  # noqa: ARG002 - for those that have some
+        """Launches whose blocks these options shape, without rows: what a machine may not be able to launch."""
+        return []
 
 
 OptionsT = TypeVar("OptionsT", bound=Options)
@@ -61,6 +69,7 @@ def plain(options: Options) -> dict[str, Any]:
 
 def checked(name: str, kind: Any, value: Any) -> Any:
     """Give ``value`` the type ``kind``; raises TilestampError with what the option ``name`` takes."""
+    limit = ""
     for candidate in _readings(value):
         try:
             converted = msgspec.convert(candidate, kind, dec_hook=_array)
@@ -68,8 +77,9 @@ def checked(name: str, kind: Any, value: Any) -> Any:
             continue
         if _representable(converted):
             return converted
+        limit = " that fits in 32 bits"
     shown = repr(value) if len(repr(value)) <= 40 else f"{repr(value)[:37]}..."
-    raise TilestampError(f"{name} takes {takes(kind)}, not {shown}")
+    raise TilestampError(f"{name} takes {takes(kind)}{limit}, not {shown}")
 
 
 def _readings(value: Any) -> list[Any]:
@@ -136,6 +146,16 @@ def _number(noun: str, info: types.IntType | types.FloatType) -> str:
     low = f" from {info.ge}" if info.ge is not None else f" over {info.gt}" if info.gt is not None else ""
     high = f" to {info.le}" if info.le is not None else f" to below {info.lt}" if info.lt is not None else ""
     return f"{noun} of {info.ge} or more" if info.ge is not None and not high else noun + low + high
+
+
+def choices(kind: Any) -> list[Any]:
+    """All values of a type that has a list of them or a range of whole numbers; none of others."""
+    if get_origin(kind) is Literal:
+        return list(get_args(kind))
+    match types.type_info(kind):
+        case types.IntType(ge=int(low), le=int(high), multiple_of=step):
+            return list(range(low, high + 1, step or 1))
+    return []
 
 
 @cache

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.bounds import bounds
+from tilestamp.models.counters import Counter
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
@@ -16,11 +18,12 @@ from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.sampling.totals import left
-from tilestamp.simulator.stage_table import interval_table, stage_table
+from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
@@ -46,6 +49,13 @@ class Run:
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
     counted: bool = True
     """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
+
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        """Note it for the manifest of whoever collects."""
+        settings = (self.width, self.height, self.fidelity, self.error, self.options)
+        note_run(self.scene, self.origin, self.pipeline, self.machine, settings)
 
     def _check_counted(self) -> None:
         if not self.counted:
@@ -108,6 +118,11 @@ class Run:
         return counts
 
     @property
+    def counters(self) -> dict[str, Counter]:
+        """What its stages declare for reports, by name: titles and kinds of columns of ``stages``."""
+        return declared(self.frame.works)
+
+    @property
     def milliseconds(self) -> float:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
@@ -116,8 +131,8 @@ class Run:
     def intervals(self) -> dict[tuple[str, str], Estimate]:
         """Value, low and high of 95 % intervals by stage (``frame``: all) and number.
 
-        Numbers are ``milliseconds``, ``instructions``, ``sample_tests`` and ``sample_hits``; what was not sampled has
-        an interval of no width.
+        Numbers are ``milliseconds``, ``instructions`` and the counts that stages declare (``sample_tests``,
+        ``sample_hits``); what was not sampled has an interval of no width.
         """
         parts: dict[tuple[str, str], list[Estimate]] = {}
         for work, found in zip(self.frame.works, self.launch_intervals, strict=True):
@@ -135,7 +150,8 @@ class Run:
         """Of one launch."""
         work, launch, timing = self.frame.works[index], self.launches[index], self.timings[index]
         counts = intervals.count_intervals(work)
-        known = {name.lower(): counts.get(name, intervals.exactly(0)) for name in ("SAMPLE_TESTS", "SAMPLE_HITS")}
+        known = {name: intervals.exactly(0) for name, counter in self.counters.items() if counter.kind == "count"}
+        known |= {counter.name: counts[counter.event] for counter in work.counters if counter.kind == "count"}
         if isinstance(work, Work) and isinstance(launch, Launch):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)
@@ -184,7 +200,24 @@ class Run:
         """The frame's time and its 95 % interval."""
         return self.intervals["frame", "milliseconds"]
 
-    def on(self, machine: Machine | str, fidelity: Fidelity | None = None) -> "Run":
+    def on(self, machine: Machine | str | Path, fidelity: Fidelity | None = None) -> "Run":
         """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
-        machine = load_machine(machine) if isinstance(machine, str) else machine
-        return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
+        return replace(self, machine=load_machine(machine), fidelity=fidelity or self.fidelity)
+
+    def manifest(self) -> dict[str, Any]:
+        """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""
+        origin = self.origin
+        return software() | {
+            "date": origin.date if origin else None,
+            "scene": {"name": self.scene, "digest": origin.scene_digest if origin else None, "note": self.note},
+            "pipeline": self.pipeline,
+            "options": self.options,
+            "machine": machine_manifest(self.machine),
+            "mix": mix_manifest(self.pipeline, self.machine),
+            "camera": origin.matrix.tolist() if origin else None,
+            "width": self.width,
+            "height": self.height,
+            "seed": origin.seed if origin else None,
+            "fidelity": self.fidelity,
+            "error": self.error,
+        }

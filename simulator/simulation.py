@@ -1,26 +1,32 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
-from tilestamp.models.price import FIDELITIES, Fidelity
+from tilestamp.models.price import Fidelity
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.options import plain
+from tilestamp.simulator.launchable import check_launches
+from tilestamp.simulator.manifest import origin_of
+from tilestamp.simulator.options import Options, plain
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sampling.completed import completed
 from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
+from tilestamp.simulator.scenes.camera import clip_matrix
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
 
 
 def simulate(
-    scene: Scene | str,
+    scene: Scene | str | Path,
     pipeline: str = "micropolygon",
-    machine: Machine | str = "gtx280",
+    machine: Machine | str | Path = "gtx280",
     *,
     width: int = 1024,
     height: int = 768,
@@ -36,11 +42,11 @@ def simulate(
 
     Parameters
     ----------
-    scene : Scene or str
+    scene : Scene, str or Path
         A scene, a name of the library, or a file.
     pipeline : str
         See ``tilestamp list pipelines``.
-    machine : Machine or str
+    machine : Machine, str or Path
         A machine, a name, or a machine file.
     width, height : int
         Pixels.
@@ -73,41 +79,48 @@ def simulate(
     TilestampError
         Bad input, in one sentence.
     """
-    scene = load_scene(scene) if isinstance(scene, str) else scene
-    machine = load_machine(machine) if isinstance(machine, str) else machine
-    _check(fidelity, width, height)
+    drawing = Drawing(width=width, height=height, fidelity=fidelity, error=error, seed=seed, picture=picture)
+    width, height, error = drawing.width, drawing.height, drawing.error
     chosen = pipeline_options(pipeline, options)
-    if not 0.0 <= error < 1.0:
-        raise TilestampError(f"error is a share of the value, 0 to 1, not {error}")
-    view = read_camera(camera if camera is not None else "default", scene)
-    matrix = view.matrix(width, height)
+    scene, machine = load_scene(scene), load_machine(machine)
+    if drawing.fidelity != "counts" and counting:
+        check_launches(pipeline, chosen, machine)
+    matrix = clip_matrix(read_camera(camera, scene), width, height)
     sampled = error and counting
     execute = (
-        SampledExecutor(error, seed, pipeline, machine) if sampled else Executor(counting=counting, picture=picture)
+        SampledExecutor(error, drawing.seed, pipeline, machine)
+        if sampled
+        else Executor(counting=counting, picture=drawing.picture)
     )
     frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, chosen, execute)
+    origin, asked = origin_of(scene, matrix, drawing.seed), plain(chosen)
     run = Run(
-        scene.name,
-        pipeline,
-        machine,
-        width,
-        height,
-        fidelity,
-        plain(chosen),
-        frame,
-        scene.note,
-        error,
-        counted=counting,
-    )
+        scene.name, pipeline, machine, width, height, drawing.fidelity, asked, frame, scene.note, error,
+        counted=counting, origin=origin,
+    )  # fmt: skip
     return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 
-def _check(fidelity: str, width: int, height: int) -> None:
-    """Refuse what no pipeline can draw."""
-    if fidelity not in FIDELITIES:
-        raise TilestampError(f"fidelity is {', '.join(FIDELITIES)}, not {fidelity}")
-    if width < 1 or height < 1:
-        raise TilestampError(f"an image of {width}x{height} pixels has no pixels")
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if width * height * BYTES_PER_PIXEL > memory:
-        raise TilestampError(f"an image of {width}x{height} pixels does not fit in this computer's memory")
+class Drawing(Options, frozen=True, kw_only=True):
+    """What every pipeline is asked alike."""
+
+    width: Annotated[int, Meta(ge=1)]
+    """Pixels."""
+    height: Annotated[int, Meta(ge=1)]
+    """Pixels."""
+    fidelity: Fidelity
+    """How far to go."""
+    error: Annotated[float, Meta(ge=0, lt=1)]
+    """Share of the value that will do."""
+    seed: Annotated[int, Meta(ge=0)]
+    """Of the random part."""
+    picture: bool
+    """Whether one is wanted."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        if self.width * self.height * BYTES_PER_PIXEL > memory:
+            raise TilestampError(
+                f"an image of {self.width}x{self.height} pixels does not fit in this computer's memory"
+            )

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tilestamp.models.counters import Counter, by_name, counters_of
 from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.timing import Timing
@@ -13,13 +15,6 @@ from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
     import pandas as pd
-
-COUNTED = {  # column of the report: machine event
-    "load_transactions": MachineEvent.LOAD_TRANSACTIONS,
-    "store_transactions": MachineEvent.STORE_TRANSACTIONS,
-    "atomics": MachineEvent.ATOMIC_LANES,
-    "atomic_conflicts": MachineEvent.ATOMIC_CONFLICTS,
-}
 
 
 def stage_table(
@@ -43,30 +38,55 @@ def stage_table(
     import pandas as pd
 
     stages = list(dict.fromkeys(work.stage for work in works))
+    counters = declared(works)
     rows = [
-        _row([part for part in zip(works, launches, timings, strict=True) if part[0].stage == stage], warp)
+        _row([part for part in zip(works, launches, timings, strict=True) if part[0].stage == stage], warp, counters)
         for stage in stages
     ]
     return pd.DataFrame(rows, index=pd.Index(stages, name="stage"))
 
 
-def _row(parts: list[tuple[Any, Any, Timing]], warp: int) -> dict[str, Any]:
+def declared(works: Sequence[Work | FixedFunctionWork]) -> dict[str, Counter]:
+    """What the stages declare, by name."""
+    return by_name(counter for work in works for counter in work.counters)
+
+
+def declared_columns(works: Sequence[Work | FixedFunctionWork], counters: Mapping[str, Counter]) -> dict[str, float]:
+    """Columns of all that any stage declares, for one stage."""
+    counts: dict[str, int] = {}
+    for work in works:
+        for event, counted in work.counts().items():
+            counts[event] = counts.get(event, 0) + counted
+    own = declared(works)
+    columns: dict[str, float] = {}
+    for name, counter in counters.items():
+        if name in own:
+            event = own[name].event
+            columns |= own[name].values(counts, [each for work in works for each in work.units(event)])
+        else:
+            columns |= counter.values({}, [])
+    return columns
+
+
+def _machine(machine: NDArray[np.float64]) -> dict[str, float]:
+    """Columns of what the machine's events declare, for one stage."""
+    counts = {event.name: round(float(machine[event])) for event in MachineEvent}
+    return {name: value for c in counters_of(MachineEvent) for name, value in c.values(counts, []).items()}
+
+
+def _row(parts: list[tuple[Any, Any, Timing]], warp: int, counters: Mapping[str, Counter]) -> dict[str, Any]:
     """One stage: sums over its launches; occupancy and bound of its longest."""
     longest = max(parts, key=lambda part: part[2].milliseconds)[2]
     simt = [(work, launch) for work, launch, _ in parts if isinstance(launch, Launch)]
     machine = sum((launch.events.sum(axis=0) for _, launch in simt), np.zeros(len(MachineEvent)))
     instructions = float(sum(machine[event] for event in INSTRUCTION_CLASSES))
-    counts = [work.counts() for work, _, _ in parts]
-    tests, hits = (sum(count.get(name, 0) for count in counts) for name in ("SAMPLE_TESTS", "SAMPLE_HITS"))
     return {
         "blocks": sum(launch.grid for _, launch in simt),
         "warps": sum(launch.grid * -(-launch.block // warp) for _, launch in simt),
         "instructions": round(instructions),
         "simd_efficiency": machine[MachineEvent.LANES] / (warp * instructions) if instructions else np.nan,
-        "sample_tests": tests,
-        "sample_hits": hits,
-        "ste": hits / tests if tests else np.nan,
-        **{name: round(float(machine[event])) for name, event in COUNTED.items()},
+        **declared_columns([work for work, _, _ in parts], counters),
+        **_machine(machine),
         "dram_bytes": sum(round(timing.dram_bytes) for _, _, timing in parts),
         "occupancy": longest.occupancy,
         "cycles": sum(timing.cycles for _, _, timing in parts),

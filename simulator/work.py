@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.simulator.sampling.strata import Sample
 
@@ -21,8 +22,8 @@ class Work:
         The paper's word for the stage, and the kernel's name inside it.
     events : type of IntEnum
         The stage's own events: the columns of ``table``. An event that bears the name of a ``MachineEvent``
-        (LOAD_TRANSACTIONS, ATOMIC_REQUESTS, BANK_REPLAYS, ...) passes through the mix as it is;
-        SAMPLE_TESTS and SAMPLE_HITS are the columns that reports show by that name.
+        (LOAD_TRANSACTIONS, ATOMIC_REQUESTS, BANK_REPLAYS, ...) passes through the mix as it is. What reports show of
+        them is declared beside them (``tilestamp.models.counters``).
     table : ndarray, (units, len(events)), int64
         Row i is unit i: a block of the grid, or the item that a persistent block or warp drew from its queue.
     grid, block : int
@@ -54,6 +55,16 @@ class Work:
     variant: str = ""
     sample: Sample | None = field(default=None, repr=False)
 
+    @property
+    def counters(self) -> tuple[Counter, ...]:
+        """What reports show of the events."""
+        return counters_of(self.events)
+
+    def units(self, event: str) -> list[NDArray[np.int64]]:
+        """An event in each unit, where the stage counts it and all units ran."""
+        counted = event in self.events.__members__ and (self.sample is None or self.sample.complete)
+        return [self.table[:, self.events[event]]] if counted else []
+
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""
         return int(self.table[:, event].sum())
@@ -77,6 +88,8 @@ class FixedFunctionWork:
         Further counts that no unit prices (SAMPLE_HITS...).
     streams : tuple of Stream
         Buffers touched.
+    counters : tuple of Counter
+        What reports show of the counts.
     """
 
     stage: str
@@ -84,6 +97,11 @@ class FixedFunctionWork:
     items: dict[str, int]
     events: dict[str, int] = field(default_factory=dict)
     streams: tuple[Stream, ...] = ()
+    counters: tuple[Counter, ...] = ()
+
+    def units(self, event: str) -> list[NDArray[np.int64]]:  # noqa: ARG002 - as those of Work
+        """An event in each unit: a fixed pipe has none."""
+        return []
 
     def counts(self) -> dict[str, int]:
         """Items by unit, in capitals, and the further counts."""

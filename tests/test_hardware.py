@@ -11,14 +11,18 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.hardware import HardwareOptions
 from tilestamp.simulator.pipelines.hardware import hardware as pipeline
+from tilestamp.simulator.reference.coverage import exact_visibility
 from tilestamp.simulator.scenes.scene import Mesh, Scene
-from tilestamp.simulator.stages.hardware import hardware, hardware_grids
+from tilestamp.simulator.stages.hardware import band_of, hardware, hardware_grids
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import make_pieces
 
 
 @pytest.mark.parametrize("name", ["bunny", "nearclip5k", "edges_512"])
 def test_coverage_at_four_bits_is_cudarasters(shared, name):
     data, gpu = (np.load(shared / f"silicon/ids/{name}_{part}.npz") for part in ("input", "512"))
-    frame, _, _ = hardware(data["positions"], data["triangles"], 512, 384, cull_backfaces=False, bits=4)
+    frame, _, _ = hardware(
+        data["positions"], data["triangles"], 512, 384, cull_backfaces=False, bits=4, guard_band=False
+    )
     assert np.array_equal(frame.ids >= 0, gpu["id"] > 0)
     assert np.count_nonzero(frame.ids != gpu["id"].astype(int) - 1) <= 2  # depths that float32 cannot tell apart
 
@@ -33,6 +37,40 @@ def test_a_square_of_quads_is_touched_twice_along_its_diagonal():
     frame, (work,), _ = hardware(*flat([(0, 0), (8, 0), (0, 8), (0, 8), (8, 0), (8, 8)]), 64, 64)
     assert work.items["z"] == 64 == np.count_nonzero(frame.ids >= 0)
     assert work.items["quads"] == 16 + 4
+
+
+def _clip_space(*corners):
+    return np.array(corners, np.float32), np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+
+
+OVERSIZED = _clip_space((-1, -1, 0, 1), (3, -1, 0, 1), (-1, 3, 0, 1))
+TWO = _clip_space((-1, -1, 0, 1), (1, -1, 0, 1), (1, 1, 0, 1), (-1, -1, 0, 1), (1, 1, 0, 1), (-1, 1, 0, 1))
+
+
+@pytest.mark.parametrize(("mesh", "quads"), [(OVERSIZED, 32 * 32), (TWO, 32 * 32 + 32)])
+def test_a_triangle_that_leaves_the_screen_stays_whole(mesh, quads):
+    frame, work, _ = hardware(*mesh, 64, 64)
+    assert (work.items["quads"], np.count_nonzero(frame.ids < 0)) == (quads, 0)
+
+
+def test_without_the_guard_band_both_pieces_count_the_quads_of_their_seam():
+    _, work, _ = hardware(*OVERSIZED, 64, 64, guard_band=False)
+    assert work.items["quads"] == 32 * 32 + 32
+
+
+@pytest.mark.parametrize(("reach", "whole"), [(1022.9, True), (1023.1, False)])
+def test_the_guard_band_ends_32767_pixels_from_the_origin(reach, whole):
+    """1022.97 half sides of 64 pixels beyond the centre."""
+    mesh = _clip_space((-1, -1, 0, 1), (reach, -1, 0, 1), (-1, reach, 0, 1))
+    pieces = make_pieces(*mesh, 64, 64, 8, band_of(64, 64))
+    assert (pieces.first[-1] == 1) == whole
+
+
+def test_what_reaches_behind_the_eye_is_clipped_at_the_near_plane_and_drawn_right():
+    floor = np.array([(-2, -1, -0.5, -0.5), (2, -1, -0.5, -0.5), (2, 2, 0.5, 4), (-2, 2, 0.5, 4)], np.float32)
+    triangles = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+    frame, _, _ = hardware(floor, triangles, 64, 64, cull_backfaces=False)
+    assert np.array_equal(frame.ids >= 0, exact_visibility(floor, triangles, 64, 64).hits[::-1] > 0)
 
 
 def test_hidden_pixels_are_tested_and_not_written():

@@ -1,34 +1,97 @@
 """Experiments in processes of their own."""
 
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+from multiprocessing import active_children
 
 import pytest
 
-from tilestamp.experiments.jobs import run_experiments
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.command_line import run_command
+from tilestamp.experiments.harness.jobs import run_experiments
+from tilestamp.experiments.harness.result import Result
+from tilestamp.models.errors import MissingInputError
 
 
-def test_one_job_runs_in_this_process(monkeypatch, tmp_path):
-    here = str(os.getpid())
-    monkeypatch.setattr(
-        "tilestamp.experiments.jobs.load_experiment",
-        lambda name: lambda _: Result(name=name, title=here, source="", cells=[]),
-    )
-    results = run_experiments(["a/x", "b/y"], tmp_path, {}, lambda _: None, 1)
-    assert [result.name for result in results] == ["a/x", "b/y"]
+@pytest.fixture
+def experiments(monkeypatch):
+    """Run what a test puts in here instead of the package's own experiments, in this process."""
+    found = {}
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs.load_experiment", found.__getitem__)
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs.describe", lambda name: f"What {name} is.")
+    monkeypatch.setattr("tilestamp.experiments.commands.reproduce.select", lambda *_, **__: list(found))
+    return found
+
+
+def result(name):
+    return lambda _: Result(name=name, title=str(os.getpid()), source="", cells=[])
+
+
+def missing(_say):
+    raise MissingInputError("put bunny.ply into a folder")
+
+
+def test_one_job_runs_in_this_process(experiments, tmp_path):
+    experiments |= {"a/x": result("a/x"), "b/y": result("b/y")}
+    outcomes = list(run_experiments(list(experiments), tmp_path, {}, lambda _: None, 1))
+    assert [outcome.name for outcome in outcomes] == ["a/x", "b/y"]
+    assert {outcome.result.title for outcome in outcomes} == {str(os.getpid())}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-x", "b-y"]
 
 
-def test_an_error_in_another_process_reaches_the_caller_and_leaves_no_process(tmp_path):
-    said: list[str] = []
-    with pytest.raises(ModuleNotFoundError, match="nowhere"):
-        run_experiments(["nowhere/a", "nobody/b"], tmp_path, {}, said.append, 2)
-    assert not multiprocessing.active_children()
+def test_what_an_experiment_says_is_passed_on(experiments, tmp_path):
+    said = []
+    experiments["a/x"] = lambda say: say("half way") or Result(name="a/x", title="", source="", cells=[])
+    list(run_experiments(["a/x"], tmp_path, {}, said.append, 1))
+    assert said == ["a/x", "half way"]
+
+
+def test_missing_input_is_said_in_its_place_and_the_others_go_on(experiments, tmp_path, capsys):
+    experiments |= {"a/x": missing, "b/y": result("b/y")}
+    assert run_command(["reproduce", "-j", "1", "-o", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "! not run: put bunny.ply into a folder" in printed
+    assert "What a/x is." in (tmp_path / "index.html").read_text()
+    assert (tmp_path / "b-y" / "manifest.json").is_file()
+
+
+def test_a_failure_is_named_at_the_end_with_exit_code_1_and_the_others_go_on(experiments, tmp_path, capsys):
+    experiments |= {"a/x": lambda _: 1 / 0, "b/y": result("b/y")}
+    assert run_command(["reproduce", "-j", "1", "-o", str(tmp_path)]) == 1
+    told = capsys.readouterr()
+    assert "[b/y]" in told.out
+    assert told.err.strip().splitlines()[-1].startswith("tilestamp: a/x failed: ZeroDivisionError: division by zero (")
+    assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == ["b-y"]
+
+
+def test_a_result_is_given_before_the_next_experiment_runs(experiments, tmp_path):
+    experiments |= {"a/x": result("a/x"), "b/y": missing}
+    coming = run_experiments(list(experiments), tmp_path, {}, lambda _: None, 1)
+    assert next(coming).name == "a/x"
+    assert [path.name for path in tmp_path.iterdir()] == ["a-x"]
+    coming.close()
+
+
+def test_an_error_in_another_process_is_an_outcome_and_leaves_no_process(tmp_path):
+    outcomes = list(run_experiments(["ste/nowhere", "silicon/nobody"], tmp_path, {}, lambda _: None, 2))
+    assert sorted(outcome.name for outcome in outcomes) == ["silicon/nobody", "ste/nowhere"]
+    assert all("ModuleNotFoundError" in outcome.failure for outcome in outcomes)
+    assert not active_children()
     assert not list(tmp_path.iterdir())
+
+
+def test_a_worker_that_dies_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr("tilestamp.experiments.harness.jobs._run_all", lambda *_: os._exit(1))
+    outcomes = list(run_experiments(["ste/nowhere", "silicon/nobody"], tmp_path, {}, lambda _: None, 2))
+    assert {outcome.name for outcome in outcomes} == {"silicon/nobody", "ste/nowhere"}
+    assert all("ended before its time" in outcome.failure for outcome in outcomes)
+    assert not active_children()
+
+
+def test_a_worker_whose_parent_is_gone_ends(tmp_path):
+    code = f"from tilestamp.experiments.harness.jobs import _send; _send('{tmp_path}/nobody', 'here')"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 1  # noqa: S603 - it is our own command
 
 
 COMMAND = """
@@ -43,13 +106,14 @@ main()
 def test_an_order_to_end_leaves_no_process_and_no_file(order, code, tmp_path):
     names = ["eisenacher2010/claims", "laine2011/memory"]
     command = [sys.executable, "-c", COMMAND, "reproduce", *names, "-j", "2", "-o", str(tmp_path)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)  # noqa: S603 - it is our own command
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - it is our own command
     assert process.stderr is not None
     for line in process.stderr:
         if line.strip() in names:  # a worker says so: it runs
             break
-    process.send_signal(order)
+    os.killpg(process.pid, order)  # as a terminal does: the workers hear it too
     said = process.communicate(timeout=30)[1]  # ends when no process holds the pipe any more
     assert process.returncode == code
     assert said.strip().splitlines()[-1].endswith("nothing was half-written")
+    assert "Traceback" not in said
     assert not list(tmp_path.iterdir())

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.laine2011 import figure5, figure6, generated, memory, slides, sweep, table3
-from tilestamp.experiments.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.mix import load_mix

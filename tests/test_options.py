@@ -78,8 +78,16 @@ def test_numpy_booleans_are_booleans_and_whole_numbers_are_not():
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e300, 0, -1.0])
 def test_a_length_is_a_number_that_a_kernel_can_take(value):
-    with pytest.raises(TilestampError, match="bound takes a number over 0"):
+    with pytest.raises(TilestampError, match="bound takes a number over 0 to 4096"):
         options("micropolygon", bound=value)
+
+
+@pytest.mark.parametrize("text", ["2 = [[0, 0]", b"\xd0\xff"])
+def test_a_file_of_positions_that_is_none_is_named(text, tmp_path):
+    path = tmp_path / "positions.toml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(TilestampError, match=r"positions\.toml"):
+        simulate("teapot", "stamps", width=8, height=8, positions=path)
 
 
 def test_a_texture_is_an_array_or_its_nested_lists():

@@ -5,10 +5,10 @@ import json
 import pandas as pd
 import pytest
 
-from tilestamp.experiments.registry import describe, experiment_names, is_slow, select
-from tilestamp.experiments.result import Cell, Result
+from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow, select
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.write import cell_texts, write_index, write_result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result
-from tilestamp.experiments.write import cell_texts, write_index, write_result
 from tilestamp.models.errors import TilestampError
 
 

@@ -21,6 +21,7 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.ru2016.fragment_shading import interpolate
+from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
 from tilestamp.simulator.stages.ru2016.tile_lists import tile_lists
 from tilestamp.simulator.stages.ru2016.tile_lists_fill import overlaps
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
@@ -40,6 +41,11 @@ def scene():
 @pytest.fixture(scope="module")
 def matrix():
     return CAMERA.matrix(WIDTH, HEIGHT)
+
+
+@pytest.fixture
+def rng_light():
+    return np.random.default_rng(3).random((HEIGHT, WIDTH), np.float32)
 
 
 def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
@@ -62,6 +68,41 @@ def test_coverage_and_depth_are_those_of_double_precision(scene, matrix, pipelin
     assert (frame.triangle_ids[sure] == ids[sure]).all()
     drawn = sure & (ids >= 0)
     assert frame.depth[drawn] == pytest.approx(depth[drawn], abs=1e-5)
+
+
+@pytest.mark.parametrize(("pipeline", "options"), [(tiled, {}), (per_primitive, {"race": False})])
+def test_samples_at_corners_are_those_of_a_picture_half_a_pixel_on(scene, matrix, pipeline, options):
+    """Up is y in the original: the sample is the lower left corner of its pixel."""
+    frame = draw(scene, matrix, pipeline, samples="corners", **options)
+    moved = np.array([0.5, -0.5, 0.0, 0.0])
+    screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT) + moved
+    ids, _, doubt = naive.draw(screen, scene.mesh.triangles, WIDTH, HEIGHT)
+    sure = doubt > NEAR_EDGE
+    assert (frame.triangle_ids[sure] == ids[sure]).all()
+    assert (frame.triangle_ids[sure] != draw(scene, matrix, pipeline, **options).triangle_ids[sure]).any()
+
+
+@pytest.mark.parametrize("name", ["Duck_fit", "CesiumMilkTruck_near"])
+def test_with_samples_at_corners_lists_and_pixels_are_the_originals_on_a_gpu(shared, name):
+    given, gpu = (np.load(shared / f"silicon/textured/{part}/ru_{name}.npz") for part in ("inputs", "measured/ids"))
+    corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
+    made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
+    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}))
+    assert (frame.maps["list length"][::-1].ravel() == gpu["t8c_cnt"].ravel()).all()
+    assert np.count_nonzero(frame.triangle_ids[::-1].ravel() != gpu["t8c_id"].ravel()) <= 1  # equal depths
+
+
+@pytest.mark.parametrize("name", ["Duck_fit", "CesiumMilkTruck_near"])
+def test_per_primitive_tests_as_many_pixels_as_the_original_does(shared, name):
+    """The near view has triangles beside the screen: they walk its border."""
+    given = np.load(shared / f"silicon/textured/inputs/ru_{name}.npz")
+    corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
+    made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
+    options = pipeline_options("per-primitive", {"samples": "corners"})
+    counts = work(per_primitive(made, given["matrix"], 800, 800, SIMT, options), "per_primitive_raster").counts()
+    counted = (shared / f"silicon/textured/source_on_cpu/ru_{name}.csv").read_text().splitlines()
+    for event in ("sample_tests", "sample_hits"):
+        assert f"per_primitive_cull,_rasterize,{event},{counts[event.upper()]}" in counted
 
 
 def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
@@ -87,7 +128,10 @@ def test_the_picture_does_not_depend_on_the_tile(scene, matrix, tile):
 
 
 def test_tiles_and_primitives_agree_without_the_race(scene, matrix):
-    tiles, primitives = draw(scene, matrix, cull_backfaces=False), draw(scene, matrix, per_primitive, race=False)
+    tiles, primitives = (
+        draw(scene, matrix, cull_backfaces=False),
+        draw(scene, matrix, per_primitive, race=False, cull_backfaces=False),
+    )
     assert (tiles.triangle_ids != primitives.triangle_ids).mean() < 0.002  # equal integer depths
 
 
@@ -129,6 +173,15 @@ def test_what_is_lost_or_wrong_is_said(matrix):
     assert any("no room" in sentence for sentence in lossy.warnings)
     assert any("not the nearest" in sentence for sentence in draw(soup(count=400), matrix, per_primitive).warnings)
     assert draw(soup(count=1), matrix).warnings == ()
+
+
+def test_both_ways_cull_backfaces_as_both_published_versions(scene, matrix):
+    for pipeline, options in ((tiled, {}), (per_primitive, {"race": False})):
+        default, culled = (draw(scene, matrix, pipeline, **options, **cull) for cull in ({}, {"cull_backfaces": True}))
+        assert (default.triangle_ids == culled.triangle_ids).all()
+        assert (
+            default.triangle_ids != draw(scene, matrix, pipeline, cull_backfaces=False, **options).triangle_ids
+        ).any()
 
 
 def test_one_triangle_cannot_race(matrix):
@@ -223,6 +276,22 @@ def test_occlusion_only_darkens(scene, matrix):
     lit, dark = draw(scene, matrix).image.astype(int), draw(scene, matrix, ssao=True).image.astype(int)
     assert (dark <= lit).all()
     assert (dark < lit).any()
+
+
+def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
+    blurred, work = occlusion_blur(rng_light, SIMT)
+    for y, x in [(0, 0), (1, 30), (20, 20), (HEIGHT - 1, WIDTH - 1)]:
+        window = rng_light[max(y - 2, 0) : y + 2, max(x - 2, 0) : x + 2]
+        assert blurred[y, x] == pytest.approx(window.mean(), rel=1e-6)
+    assert work.block == 144
+
+
+def test_the_blur_loads_and_stores_as_often_as_an_h200_counts():
+    """Measured on the original at 800x800: a sector for each thread that loads, and for each that stores."""
+    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt())[1].counts()
+    assert counts["STORE_TRANSACTIONS"] == 640_000
+    assert counts["LOAD_TRANSACTIONS"] == pytest.approx(1_429_963, rel=0.01)
+    assert (counts["WARPS"], counts["BLUR_WARPS"]) == (50_000, 40_000)
 
 
 def test_a_lone_plane_is_not_occluded(matrix):

@@ -198,7 +198,7 @@ def test_a_frame_that_is_too_small_to_pay_for_a_sample_runs_in_full(pipeline, ma
 
 @pytest.mark.parametrize("error", [-0.1, 1.0, float("nan")])
 def test_an_error_that_is_no_share_is_refused(error):
-    with pytest.raises(TilestampError, match="error is a share of the value"):
+    with pytest.raises(TilestampError, match="error takes a number from 0 to below 1"):
         simulate("teapot", error=error)
 
 

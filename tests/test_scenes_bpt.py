@@ -90,7 +90,7 @@ def test_a_file_of_other_bytes_is_refused(tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(TilestampError, match=r"a\.bpt: cannot be read"):
+    with pytest.raises(TilestampError, match=r"a\.bpt: there is no such file"):
         read_bpt(tmp_path / "a.bpt")
 
 

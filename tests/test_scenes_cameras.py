@@ -123,7 +123,7 @@ def test_the_published_cameras_are_read(shared):
         ({**LOOK, "far": 0.5}, "0 < near < far"),
         ({**AHEAD, "forward": [0, 0]}, "3 numbers each"),
         ({"eye": [0, 0, 1]}, "it has eye"),
-        (42, "a int is not a camera"),
+        (42, "42 is not a camera"),
         ("nowhere", "no such view"),
         ("missing.json", "missing.json: the camera file cannot be read"),
     ],

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tilestamp.experiments.silicon.cudaraster_blocks import CHAINS, LANES, RUNS, Run
-from tilestamp.experiments.silicon.cudaraster_mix import FITTED, chain, instructions
+from tilestamp.experiments.calibration.cudaraster_blocks import CHAINS, LANES, RUNS, Run
+from tilestamp.experiments.calibration.cudaraster_mix import FITTED, chain, instructions
+from tilestamp.experiments.calibration.mix_from_sass import RASTER, main
+from tilestamp.experiments.calibration.raster_sections import raster_sections
+from tilestamp.experiments.calibration.sass import Instruction, basic_blocks, classes, cycles, read_functions
 from tilestamp.experiments.silicon.h200 import status
 from tilestamp.experiments.silicon.leave_one_out import refit
-from tilestamp.experiments.silicon.mix_from_sass import RASTER, main
-from tilestamp.experiments.silicon.raster_sections import raster_sections
-from tilestamp.experiments.silicon.sass import Instruction, basic_blocks, classes, cycles, read_functions
 from tilestamp.models.events import EVENTS
 from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.machine import load_machine

@@ -7,11 +7,13 @@ from tilestamp.experiments.stability import (
     depth_twice,
     far_away,
     grazing,
+    guard_band,
     methods,
     shared_edges,
     slivers,
     z_fighting,
 )
+from tilestamp.simulator.scenes.scene import Scene
 
 
 @pytest.mark.parametrize(
@@ -94,6 +96,34 @@ def test_the_guard_band_of_1_1_is_what_nvdiffrast_has_not():
     assert not clipping.clips("1.1", 20.0)
     assert clipping.clips("1.1", 21.0)
     assert clipping.clips("nvdiffrast", 0.5)
+
+
+@pytest.mark.parametrize("method", ["cudaraster 1.1", "cudaraster of nvdiffrast, guard_band on"])
+@pytest.mark.parametrize(("case", "holds", "breaks"), [("far out", 32_767, 32_768), ("near plane", 0.99, 1.01)])
+def test_a_clipped_triangle_leaves_holes_beside_a_whole_one(method, case, holds, breaks):
+    assert guard_band.holes(method, guard_band.CASES[case], holds) == 0
+    assert guard_band.holes(method, guard_band.CASES[case], breaks) == 2
+
+
+@pytest.mark.parametrize("method", list(guard_band.METHODS)[2:])
+@pytest.mark.parametrize(("case", "hardest"), [("far out", 2**20), ("near plane", 1.01)])
+def test_who_cuts_an_edge_for_both_its_triangles_or_for_neither_leaves_no_hole(method, case, hardest):
+    assert guard_band.holes(method, guard_band.CASES[case], hardest) == 0
+
+
+def test_a_surface_past_the_near_plane_has_a_hole_under_the_guard_band_only():
+    """Two triangles of one surface, found by looking about; the original's rules leave the pixel out too."""
+    corners = [
+        (0.29132724, -0.22290927, 0.0325895, 0.05254693),
+        (-1.0835345, 0.59996146, -1.165537, -1.1443821),
+        (-0.9314631, 0.01087255, 1.5994446, 1.617836),
+        (-2.3063247, 0.8337433, 0.40131807, 0.42090696),
+    ]
+    scene = Scene.from_clip_space(corners, [(0, 1, 3), (0, 3, 2)])
+    band, none = (
+        methods.draw(scene, "cudaraster", 64, cull_backfaces=False, guard_band=on).triangle_ids for on in (True, False)
+    )
+    assert (band[51, 3], none[51, 3]) == (-1, 1)
 
 
 @pytest.mark.parametrize(

@@ -88,3 +88,9 @@ def test_the_level_of_detail_is_the_log_of_the_longer_derivative(image):
 
 def test_magnification_has_level_zero(image):
     assert level_of_detail(texture_chains([image]), 0, *[np.float32(1e-4)] * 4) == 0.0
+
+
+def test_a_chain_has_as_many_levels_as_asked_for():
+    image = np.zeros((64, 64, 4), np.uint8)
+    counts = [int(texture_chains([image], levels=levels).counts[0]) for levels in (0, 4, 20)]
+    assert counts == [7, 4, 7]

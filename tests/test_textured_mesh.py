@@ -8,9 +8,11 @@ import pytest
 from PIL import Image
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.gltf_mesh import read_gltf
+from tilestamp.simulator.scenes.obj_file import read_obj
+from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
 from tilestamp.simulator.scenes.scene import Mesh, Scene
-from tilestamp.simulator.scenes.textured_mesh import geometry, read_gltf
-from tilestamp.simulator.scenes.textured_obj import read_textured_obj
+from tilestamp.simulator.scenes.textured_mesh import geometry
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
@@ -95,7 +97,7 @@ def test_missing_normals_are_made(tmp_path):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (lambda t: t["accessors"][0].update(sparse={}), "sparse"),
+        (lambda t: t["accessors"][0].update(sparse={}), "accessor 0"),
         (lambda t: t.update(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression"),
         (lambda t: t["asset"].update(version="1.0"), "only glTF 2.0"),
         (lambda t: t["accessors"][0].update(count=99), "accessor 0"),
@@ -130,6 +132,10 @@ def test_an_index_beyond_the_vertices_is_refused(tmp_path):
         read_gltf(glb(tmp_path, binary=data))
 
 
+def read_textured_obj(path):
+    return mesh_from_obj(read_obj(path), path)
+
+
 def obj(tmp_path, material):
     (tmp_path / "m.mtl").write_text(material)
     path = tmp_path / "m.obj"
@@ -138,7 +144,7 @@ def obj(tmp_path, material):
 
 
 def test_an_obj_has_texture_coordinates_from_the_top(tmp_path):
-    mesh = read_textured_obj(obj(tmp_path, ""))
+    mesh = read_textured_obj(obj(tmp_path, "newmtl a\nmap_Kd nowhere.png\n"))
     assert sorted(map(tuple, mesh.uvs.tolist())) == [(0.0, 1.0), (0.0, 1.0), (1.0, 0.75)]
 
 

@@ -126,6 +126,38 @@ def test_a_triangle_through_the_eye_plane_is_clipped(matrix):
     assert (frame.triangle_ids == 0).any()
 
 
+def test_with_the_originals_faults_the_rows_beyond_whole_blocks_and_one_fragment_are_missing(scene, matrix):
+    """131 rows of pixels are 17 rows of tiles: 16 of them are launched, 128 rows of pixels from the bottom."""
+    wall = np.array([[-9, -9, 0, 1], [9, -9, 0, 1], [0, 14, 0, 1]], np.float32)
+    covered = Scene("wall", mesh=Mesh(wall, np.array([[0, 1, 2]], np.int32)))
+    whole, lossy = (draw(covered, matrix, original_faults=faults).triangle_ids for faults in (False, True))
+    missing = (whole >= 0) & (lossy < 0)
+    assert (lossy[:3] < 0).all()
+    assert missing[3:].sum() == 1
+    assert missing[-1, 0]  # the first quad of the first tile
+
+
+def test_fragment_0_is_lost_below_another_one_too(matrix):
+    """Two walls by order-independent transparency: fragment 0 ends the list of the lower left pixel."""
+    corners = [(x, y, z, 1) for z in (0, 1) for x, y in ((-9, -9), (9, -9), (0, 14))]
+    mesh = Mesh(np.array(corners, np.float32), np.arange(6, dtype=np.int32).reshape(2, 3))
+    whole, lossy = (
+        draw(Scene("walls", mesh=mesh), matrix, order="oit", opacity=0.5, original_faults=faults).image[3:].astype(int)
+        for faults in (False, True)
+    )
+    assert [tuple(place) for place in np.argwhere((whole != lossy).any(axis=2))] == [(HEIGHT - 4, 0)]
+    assert (lossy[-1, 0] > 0).all()  # the other wall
+
+
+def test_at_1080_the_top_24_rows_stay_empty_as_on_a_gpu(shared):
+    name = "zh_bunny_5k_near.npz"
+    given, gpu = (np.load(shared / f"silicon/textured/{part}/{name}") for part in ("inputs", "measured/ids"))
+    made = Scene("bunny", mesh=Mesh(given["positions"], given["triangles"].astype(np.int32)))
+    ids = binned(made, given["matrix"], 1920, 1080, SIMT, BinnedOptions(original_faults=True)).triangle_ids[::-1]
+    assert np.flatnonzero((gpu["id"] >= 0).any(axis=1)).max() == 1055
+    assert ((ids >= 0) != (gpu["id"] >= 0)).sum() < 20  # float32 edges: 15 of 612,751
+
+
 def test_hi_z_rejects_nothing_visible(matrix):
     far = soup(seed=5, count=30).mesh
     wall = np.array([[-9, -9, 2, 1], [9, -9, 2, 1], [0, 12, 2, 1]], np.float32)

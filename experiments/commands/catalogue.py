@@ -8,10 +8,11 @@ from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import option_table
 from tilestamp.experiments.commands.terminal import print_wrapped
-from tilestamp.experiments.registry import describe, experiment_names, is_slow
+from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.machine import list_machines
-from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names
+from tilestamp.models.machine import list_machines, load_machine
+from tilestamp.simulator.launchable import launchable_values, listed
+from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names, pipeline_options
 from tilestamp.simulator.scenes import list_scenes
 
 Kind = Literal["scenes", "pipelines", "machines", "experiments", "options"]
@@ -22,6 +23,7 @@ def catalogue(
     pipeline: str | None = None,
     /,
     *,
+    machine: str | None = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
     """List scenes, pipelines, machines or experiments, or the options of a pipeline, and what each is.
@@ -32,13 +34,15 @@ def catalogue(
         What to list.
     pipeline
         Whose options.
+    machine
+        Say of each option which values this machine can launch, where it cannot all.
     json_
         Print a JSON object instead of lines.
     """
-    if (kind == "options") != (pipeline is not None):
+    if (kind == "options") != (pipeline is not None) or (machine and not pipeline):
         raise TilestampError("write: tilestamp list options PIPELINE, or list and one of the other kinds")
     if pipeline is not None:
-        _list_options(pipeline, json_)
+        _list_options(pipeline, machine, json_)
         return
     lines = entries(kind)
     if json_:
@@ -49,9 +53,12 @@ def catalogue(
         sys.stdout.write(f"{name:{width}}  {line}\n")
 
 
-def _list_options(pipeline: str, json_: bool) -> None:
-    """Print what each option of a pipeline takes, its default and what it is."""
+def _list_options(pipeline: str, machine: str | None, json_: bool) -> None:
+    """Print what each option of a pipeline takes, on a machine, its default and what it is."""
     options = option_table(options_type(pipeline))
+    default = pipeline_options(pipeline, {})
+    for name, values in (launchable_values(pipeline, default, load_machine(machine)) if machine else {}).items():
+        options[name]["takes"] += f"; {machine} can launch {listed(values) if values else 'none'}"
     if json_:
         sys.stdout.write(json.dumps(options) + "\n")
         return

@@ -9,14 +9,9 @@ from tilestamp.experiments.commands.terminal import print_table
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 
-SHOWN = {  # column of the terminal table: how to print it
-    "blocks": ",.0f",
-    "warps": ",.0f",
-    "instructions": ",.0f",
-    "simd_efficiency": ".3f",
-    "sample_tests": ",.0f",
-    "sample_hits": ",.0f",
-    "ste": ".4f",
+FORMATS = {"count": ",.0f", "bytes": ",.0f", "ratio": ".4f", "distribution": ",.1f"}  # by kind of a counter
+COST = {"blocks": ",.0f", "warps": ",.0f", "instructions": ",.0f", "simd_efficiency": ".3f"}  # before counters
+TIME = {  # after them
     "atomics": ",.0f",
     "occupancy": ".2f",
     "milliseconds": ".3f",
@@ -70,9 +65,11 @@ def as_json(run: Run) -> dict[str, Any]:
         "milliseconds": run.milliseconds if run.counted else None,
         **_sampling(run),
         "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
+        "counters": {name: {"title": c.title, "kind": c.kind} for name, c in run.counters.items()},
         "counts": run.counts if run.counted else {},
         "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
         "warnings": list(run.frame.remarks),
+        "manifest": run.manifest(),
     }
 
 
@@ -101,7 +98,8 @@ def print_run(run: Run, output: Path | None) -> None:
     """Print the table of stages, and a line for all else that is to be said."""
     title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}"
     if run.counted:
-        columns = {name: kind for name, kind in SHOWN.items() if name in run.stages}
+        counted = {name: FORMATS[counter.kind] for counter in run.counters.values() for name in counter.columns}
+        columns = {name: kind for name, kind in (COST | counted | TIME).items() if name in run.stages}
         rows = [
             [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
             for stage, row in run.stages[list(columns)].to_dict(orient="index").items()

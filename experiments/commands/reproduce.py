@@ -1,6 +1,7 @@
 """``tilestamp reproduce``: published tables beside ours."""
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -8,13 +9,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.terminal import print_table, progress
-from tilestamp.experiments.jobs import default_jobs, run_experiments
-from tilestamp.experiments.registry import experiment_names, select
-from tilestamp.experiments.result import Result
-from tilestamp.experiments.write import COLUMNS, cell_texts, write_index
+from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
+from tilestamp.experiments.harness.registry import experiment_names, select
+from tilestamp.experiments.harness.result import Outcome, Result
+from tilestamp.experiments.harness.write import COLUMNS, cell_texts, write_index
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
+FAILED = 1  # exit code where an experiment gave no result
 
 
 def reproduce(
@@ -23,7 +25,7 @@ def reproduce(
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     jobs: Annotated[int | None, Parameter(name=["--jobs", "-j"])] = None,
-) -> None:
+) -> int:
     """Print published tables beside what the model computes, cell by cell, and write CSV, manifests, plots and a page.
 
     Parameters
@@ -42,16 +44,37 @@ def reproduce(
     chosen = select(names, everything=all_)
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
+    _make(output)
     with progress(f"reproducing {len(chosen)} experiments") as say:
-        results = run_experiments(chosen, output, {"names": list(names)}, say, jobs or default_jobs())
+        options = {"names": list(names), "command": shlex.join(sys.argv)}
+        outcomes: dict[str, Outcome] = {}
+        for outcome in run_experiments(chosen, output, options, say, jobs or default_jobs()):
+            outcomes[outcome.name] = outcome
+            if outcome.result is not None and not json_:
+                with say.paused():
+                    _print_result(outcome.result)
+        results = [result for name in chosen if (result := outcomes[name].result) is not None]
         page = write_index(results, output)
     if json_:
         cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
         sys.stdout.write(json.dumps(cells) + "\n")
-        return
-    for result in results:
-        _print_result(result)
-    _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
+    else:
+        _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
+    return _print_failures([outcomes[name] for name in chosen if outcomes[name].failure])
+
+
+def _make(output: Path) -> None:
+    """Make the folder for the results before anything is computed."""
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TilestampError(f"-o {output}: cannot be made ({error.strerror})") from error
+
+
+def _print_failures(failed: list[Outcome]) -> int:
+    """Name what failed, and why; give the exit code."""
+    sys.stderr.writelines(f"tilestamp: {outcome.name} failed: {outcome.failure}\n" for outcome in failed)
+    return FAILED if failed else 0
 
 
 def _print_end(output: Path, page: Path, left: set[str]) -> None:
@@ -66,12 +89,17 @@ def _print_result(result: Result) -> None:
     sys.stdout.write("\n")
     for warning in result.warnings:
         sys.stdout.write(f"! {warning}\n")
-    rows = [cell_texts(cell) for cell in result.cells]
-    styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
-    print_table(f"{result.title} [{result.name}]", COLUMNS, rows, styles)
+    title = f"{result.title} [{result.name}]"
+    if result.cells:
+        rows = [cell_texts(cell) for cell in result.cells]
+        styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
+        print_table(title, COLUMNS, rows, styles)
+    else:
+        sys.stdout.write(f"{title}\n")
     errors = result.predicted_errors
     if errors:
         mean, worst = 100 * sum(errors) / len(errors), 100 * max(errors)
         sys.stdout.write(f"{len(errors)} predicted cells: mean absolute error {mean:.1f} %, worst {worst:.1f} %\n")
     for note in result.notes:
         sys.stdout.write(f"- {note}\n")
+    sys.stdout.flush()  # as they come, into a file too

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
+from rich.status import Status
 from rich.table import Table
 from rich.text import Text
 
@@ -15,7 +16,7 @@ def progress(text: str) -> Iterator["Progress"]:
     """Show what is being done on standard error, and which kernels are being compiled meanwhile."""
     console = Console(stderr=True)
     with console.status(text) as status:
-        said = Progress(console, status.update, text)
+        said = Progress(console, status, text)
         on_compiling(said.compiling)
         yield said
 
@@ -23,9 +24,9 @@ def progress(text: str) -> Iterator["Progress"]:
 class Progress:
     """Call it with what is being done now."""
 
-    def __init__(self, console: Console, update: object, text: str) -> None:
+    def __init__(self, console: Console, status: Status, text: str) -> None:
         self._console = console
-        self._update = update
+        self._status = status
         self._text = text
         self._compiled = 0
 
@@ -33,7 +34,7 @@ class Progress:
         """Say that a kernel is being compiled: each in place on a terminal, elsewhere only the first."""
         self._compiled += 1
         if self._console.is_terminal:
-            self._update(f"{self._text}: compiling {kernel}, once (kernel {self._compiled})")  # type: ignore[operator]
+            self._status.update(f"{self._text}: compiling {kernel}, once (kernel {self._compiled})")
         elif self._compiled == 1:
             self._console.print("compiling kernels: only the first time, a minute or two")
 
@@ -41,9 +42,16 @@ class Progress:
         """Say what is being done: in place on a terminal, a line each elsewhere."""
         self._text = text
         if self._console.is_terminal:
-            self._update(text)  # type: ignore[operator]  # rich's Status.update
+            self._status.update(text)
         else:
             self._console.print(text)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Show nothing meanwhile: rich sends to standard error what is printed beside a line in place."""
+        self._status.stop()
+        yield
+        self._status.start()
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], styles: Sequence[str] = ()) -> None:

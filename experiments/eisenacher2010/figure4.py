@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:

@@ -2,6 +2,8 @@
 
 from functools import cache
 
+from tilestamp.models.price import Fidelity
+from tilestamp.models.used import remembered
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import scene_or_stand_in
 from tilestamp.simulator.scenes.scene import Scene
@@ -19,7 +21,7 @@ def model(name: str) -> Scene:
     return scene_or_stand_in(name)
 
 
-@cache
+@remembered
 def frame(
     name: str = "killeroo",
     width: int = 1600,
@@ -32,6 +34,7 @@ def frame(
     box_tests: bool = True,
     edges: str = "computed",
     hybrid: bool = False,
+    fidelity: Fidelity = "schedule",
 ) -> Run:
     """One frame of the paper; ``pixel_extent`` is the reading of its bound that fits its counts (``scenes.views``)."""
     scene = model(name)
@@ -49,6 +52,7 @@ def frame(
         box_tests=box_tests,
         edges=edges,
         hybrid=hybrid,
+        fidelity=fidelity,
     )
 
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, stage_ms, stand_in_warnings
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.work import Work
 
@@ -36,7 +36,7 @@ def run(progress: Progress) -> Result:
     rows = []
     for line in published(__file__, "table1").itertuples():
         progress(f"eisenacher2010/table1: tiles of {line.tile_size}")
-        made = bucketing(frame(tile=int(line.tile_size)))
+        made = bucketing(frame(tile=int(line.tile_size), fidelity="counts"))
         cells += _cells(line, made)
         rows.append({"tile": line.tile_size, "published": line.address_calc_ms, **_why(made)})
     table = pd.DataFrame(rows)
@@ -72,9 +72,9 @@ def run(progress: Progress) -> Result:
 
 
 def bucketing(made: "Run") -> "Run":
-    """Leave out the tile raster: a GTX 280 cannot launch the 1024 threads of a 32-pixel tile."""
+    """Price what was counted without the tile raster: a GTX 280 cannot launch the 1024 threads of a 32-pixel tile."""
     works = [work for work in made.frame.works if work.stage != "tile_raster"]
-    return replace(made, frame=replace(made.frame, works=works))
+    return replace(made, frame=replace(made.frame, works=works), fidelity="schedule")
 
 
 def _cells(line: "pd.Series[float]", made: "Run") -> list[Cell]:

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:

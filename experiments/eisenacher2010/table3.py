@@ -11,8 +11,8 @@ from tilestamp.experiments.eisenacher2010.frames import (
     stage_ms,
     stand_in_warnings,
 )
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.reports.plots import stacked_bars
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 from tilestamp.simulator.work import Work

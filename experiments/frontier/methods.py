@@ -33,8 +33,8 @@ from tilestamp.experiments.frontier.methods_variants import (
 from tilestamp.experiments.frontier.model_frames import is_long
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.frontier.picture_error import depth_errors, pixel_errors
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.methods_plot import panels, side_by_side
 from tilestamp.simulator.reference.picture import SIDE

@@ -45,8 +45,8 @@ FREEPIPE = [
 ]
 TILED = [Variant("tiled", f"tile {tile}", {"tile": tile, **BOTH_SIDES}) for tile in (4, 8, 16, 32)]
 PER_PRIMITIVE = [
-    Variant("per-primitive", "as written", {"race": True}),
-    Variant("per-primitive", "without its race", {"race": False}),
+    Variant("per-primitive", "as written", {"race": True, **BOTH_SIDES}),
+    Variant("per-primitive", "without its race", {"race": False, **BOTH_SIDES}),
 ]
 BINNED = [
     Variant("binned", "", dict(BOTH_SIDES)),

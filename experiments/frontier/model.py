@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from tilestamp.experiments.frontier.model_frames import Timed, frames, is_long, warnings
 from tilestamp.experiments.frontier.model_notes import AUTO, BOUNDS, COUNTS, FULL, notes
 from tilestamp.experiments.frontier.pareto import pareto_front
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
 from tilestamp.models.price import Fidelity

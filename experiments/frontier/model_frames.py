@@ -4,26 +4,24 @@ None of these times was fitted: mixes were on the killeroo at 1600x1200, on othe
 on the teapot at 512x512 with a bound of 4.
 """
 
-import json
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tilestamp.experiments.eisenacher2010.frames import model, overhead_ms, stand_in_warnings
+from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.laine2011 import sweep
-from tilestamp.experiments.published import published
-from tilestamp.experiments.silicon.h200 import folder
-from tilestamp.models.errors import TilestampError
+from tilestamp.experiments.silicon.seen_scenes import SEEN
+from tilestamp.experiments.validation.back_end import cameras
+from tilestamp.experiments.validation.quantities import TIME_METRIC
+from tilestamp.experiments.validation.stored import MICROPOLYGON, read
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 VARIABLE = "TILESTAMP_FRONTIER"  # "long" for the long grid
 EISENACHER = (("teapot", 512), ("killeroo", 512), ("bigguy", 1600))
@@ -84,8 +82,7 @@ def frames() -> list[Timed]:
 def warnings() -> list[str]:
     """Say which frames are of stand-ins or missing."""
     chosen = EISENACHER_LONG if is_long() else EISENACHER
-    said = stand_in_warnings(*dict.fromkeys(name for name, _ in chosen))
-    return said if list(_h200()) else [*said, "No measurements of an H200 at hand: its kernels are left out."]
+    return stand_in_warnings(*dict.fromkeys(name for name, _ in chosen))
 
 
 def _eisenacher() -> Iterator[Timed]:
@@ -116,27 +113,15 @@ def _laine() -> Iterator[Timed]:
 
 def _h200() -> Iterator[Timed]:
     """The tile raster of some scenes, as it was measured on an H200."""
-    import pandas as pd
-
-    try:
-        stored = folder()
-    except TilestampError:
-        return
-    table = pd.read_csv(stored / "micropolygon.csv")
-    cameras = json.loads((stored / "micropolygon_cameras.json").read_text("utf-8"))
+    measured = read(SEEN / MICROPOLYGON)
     for scene in H200_LONG if is_long() else H200:
-        camera = cameras[scene]
+        camera = cameras(SEEN)[scene]
         options = {"width": camera["width"], "height": camera["height"], "camera": np.array(camera["model_to_clip"])}
         options |= {"tile": TILE, "bound": camera["bound_pixels"]}
-        about, known = f"{scene}, tile raster, H200", _measured(table, scene)
+        about = f"{scene}, tile raster, H200"
+        known = measured[scene, camera["width"], TILE, 1, "k_raster", TIME_METRIC] * 1e-3
         shown = load_scene(camera["model"])
         yield Timed(about, shown, "micropolygon", "h200", options, _stages("tile_raster"), known, "measured")
-
-
-def _measured(table: "pd.DataFrame", scene: str) -> float:
-    """Milliseconds of the tile raster at one sample a pixel."""
-    is_it = (table.scene == scene) & (table.tile == TILE) & (table.spp == 1) & (table.kernel == "k_raster")
-    return float(table[is_it & (table.metric == "cupti_us_median") & (table.source == "cupti")].value.iloc[0]) * 1e-3
 
 
 def _stages(*names: str) -> Callable[[Run], float]:

@@ -4,6 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.laine2011.sweep import (
     FITTED_AREAS,
     PUBLISHED_AREAS,
@@ -16,9 +19,6 @@ from tilestamp.experiments.laine2011.sweep import (
     nanoseconds,
     published_ns,
 )
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
 from tilestamp.reports.fitted_lines import fitted_lines
 
 if TYPE_CHECKING:

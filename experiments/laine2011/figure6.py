@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, STAGES, WIDTH
 from tilestamp.experiments.laine2011.table3 import CAMERA, FULL, buddha, load_buddha, reduced_warning
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes import load_scene
 from tilestamp.simulator.scenes.search_path import find_scene

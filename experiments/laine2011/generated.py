@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.published import published
+from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.used import remembered
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
@@ -125,7 +126,7 @@ def made(name: str) -> Scene:
     return generate(next(scene for scene in statistics() if scene.name == name))
 
 
-@cache
+@remembered
 def draw(name: str, pipeline: str, width: int, height: int) -> Run:
     """Draw a generated scene once."""
     return simulate(made(name), pipeline, MACHINE, width=width, height=height)

@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING
 
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:

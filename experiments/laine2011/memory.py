@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.laine2011.generated import draw, scenes, statistics, warning
 from tilestamp.experiments.laine2011.sweep import SOURCE
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
 

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.laine2011.generated import PIPELINES, VARIABLE, draw, scenes, sizes, warning
 from tilestamp.experiments.laine2011.sweep import SOURCE
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result
 from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:

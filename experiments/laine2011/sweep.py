@@ -5,11 +5,13 @@ from functools import cache
 
 import numpy as np
 
-from tilestamp.experiments.published import published
+from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.models.used import remembered
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import plain
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 from tilestamp.simulator.run import Run
@@ -49,7 +51,7 @@ def areas() -> tuple[float, ...]:
     return chosen
 
 
-@cache
+@remembered
 def draw(area: float) -> tuple[Run, int]:
     """Draw one area; give the run without its picture, and its triangles."""
     machine = load_machine(MACHINE)
@@ -59,7 +61,8 @@ def draw(area: float) -> tuple[Run, int]:
     assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)
-    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", plain(options), bare)
+    origin = origin_of(scene, np.eye(4), seed=0)
+    run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", plain(options), bare, origin=origin)
     return run, len(scene.mesh.triangles)
 
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
-from tilestamp.experiments.published import published
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Cell, Figure, Result, Status
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.scenes.search_path import find_scene

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.ru2016.setting import (
     DEGREE_VIEW,
     INTEROP_MS,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.ru2016.setting import (
     INTEROP_MS,
     MACHINE,

@@ -1,1 +1,1 @@
-"""Against silicon: measurements on an H200, mixes read from its machine code, predictions beside counters and times."""
+"""Against silicon: measurements on an H200, predictions beside counters and times."""

@@ -1,16 +1,17 @@
 """H200: hardware counters and times of CudaRaster, FreePipe and the micropolygon back end beside the model's."""
 
-import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.silicon.inputs import write_inputs
+from tilestamp.experiments.silicon.seen_scenes import SEEN, seen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
 from tilestamp.experiments.validation.stored import compare
 from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.plots import paired_bars
 
@@ -19,8 +20,7 @@ if TYPE_CHECKING:
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 
-SHARED = "TILESTAMP_SHARED"  # names the folder that has silicon/ in it
-SOURCE = "Measurements on one NVIDIA H200, CUDA 13.0: medians of 60 by CUPTI, counters by ncu"
+SOURCE = "One NVIDIA H200, CUDA 13.0: experiments/silicon/measured/seen/README.md"
 CONSTANTS = "teapot_512x512_bb4"  # scene whose tile raster times gave S2UR, BRANCH and pipe.control
 FITTED = {  # quantities that gave a mix a number, on every scene and width: see leave_one_out for what that is worth
     "triangleSetup": {"instructions", "SIMD efficiency", TIME},
@@ -34,7 +34,9 @@ FITTED = {  # quantities that gave a mix a number, on every scene and width: see
 
 def run(progress: Callable[[str], None]) -> Result:
     """Predict every measured kernel."""
-    table = compare(folder(), load_machine("h200"), progress)
+    with TemporaryDirectory() as folder:
+        left_out = write_inputs(Path(folder), seen_scenes())
+        table = compare(SEEN, load_machine("h200"), progress, inputs=Path(folder), left_out=left_out)
     walls = table[table.quantity == WALL].ours
     table = table[table.quantity != WALL].copy()
     table["status"] = [status(*row) for row in table[["scene", "kernel", "quantity"]].itertuples(index=False)]
@@ -62,24 +64,9 @@ def run(progress: Callable[[str], None]) -> Result:
         cells=_cells(table),
         figures=_figures(table),
         notes=notes,
-        warnings=[],
+        warnings=left_out,
         tables=tables,
     )
-
-
-def folder() -> Path:
-    """Folder of measurements.
-
-    Raises
-    ------
-    TilestampError
-        Where it is not.
-    """
-    shared = Path(os.environ.get(SHARED, Path(__file__).resolve().parents[3] / "shared"))
-    found = shared / "silicon"
-    if not found.is_dir():
-        raise TilestampError(f"no measurements: set {SHARED} to the folder that has silicon/ in it")
-    return found
 
 
 def status(scene: str, kernel: str, quantity: str) -> Status:

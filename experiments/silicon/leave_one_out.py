@@ -9,14 +9,18 @@ is predicted with them; chains are fitted anew by one factor a kernel. Narrow sc
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.result import Cell, Result
-from tilestamp.experiments.silicon import cudaraster_mix, freepipe_mix
-from tilestamp.experiments.silicon.h200 import SOURCE, folder
+from tilestamp.experiments.calibration import cudaraster_mix, freepipe_mix
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.silicon.h200 import SOURCE
+from tilestamp.experiments.silicon.inputs import write_inputs
+from tilestamp.experiments.silicon.seen_scenes import SEEN, seen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME_METRIC, warm_microseconds
 from tilestamp.experiments.validation.stored import CUDARASTER, FREEPIPE, cudaraster_works, freepipe_works, read
 from tilestamp.models.events import INSTRUCTION_CLASSES
@@ -38,7 +42,9 @@ AIM_INSTRUCTIONS, AIM_TIME = 0.02, 0.40
 def run(progress: Callable[[str], None]) -> Result:
     """Leave each scene out of the fits in turn."""
     machine = load_machine("h200")
-    rows = list(_rows(machine, progress))
+    with TemporaryDirectory() as folder:
+        left_out = write_inputs(Path(folder), seen_scenes())
+        rows = list(_rows(machine, progress, Path(folder)))
     cells = []
     for kernel in FITTED:
         mine = [row for row in rows if row["kernel"] == kernel]
@@ -71,16 +77,17 @@ def run(progress: Callable[[str], None]) -> Result:
         cells=cells,
         figures=[],
         notes=_notes(cells),
+        warnings=left_out,
     )
 
 
-def _rows(machine: Machine, say: Callable[[str], None]) -> Iterator[dict[str, Any]]:
+def _rows(machine: Machine, say: Callable[[str], None], inputs: Path) -> Iterator[dict[str, Any]]:
     """Measured and counted, a kernel of a scene each."""
     widest = int(os.environ.get(WIDTH, "512"))
     for name, works in ((CUDARASTER, cudaraster_works), (FREEPIPE, freepipe_works)):
-        measured = read(folder() / name)
+        measured = read(SEEN / name)
         mix = load_mix("cudaraster" if name == CUDARASTER else "freepipe", machine.compute_capability)
-        for key, work in works(folder(), machine, say, widest):
+        for key, work in works(SEEN, machine, say, widest, inputs):
             if key[4] in FITTED and (*key, INSTRUCTIONS) in measured and (*key, TIME_METRIC) in measured:
                 launch = mix.launch(work, machine.sm.warp_size)
                 yield {

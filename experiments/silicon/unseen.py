@@ -1,7 +1,7 @@
 """H200, unseen: scenes that no number of the mixes was fitted to, model beside machine.
 
 Thirteen scenes at three sizes through CudaRaster and FreePipe, five through the micropolygon back end
-(``measured/README.md``). None of them gave a mix or the machine a number, so all cells are predictions.
+(``measured/unseen/README.md``). None of them gave a mix or the machine a number, so all cells are predictions.
 ``TILESTAMP_UNSEEN_WIDTH`` leaves out wider screens (1024: a minute; all: several).
 """
 
@@ -11,8 +11,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.result import Cell, Result
-from tilestamp.experiments.silicon.unseen_scenes import write_inputs
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.silicon.inputs import write_inputs
+from tilestamp.experiments.silicon.unseen_scenes import unseen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
 from tilestamp.experiments.validation.stored import compare
 from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
@@ -24,17 +25,25 @@ if TYPE_CHECKING:
 SLOW = True  # counts 13 scenes at up to 2048 pixels
 
 WIDTH = "TILESTAMP_UNSEEN_WIDTH"
-MEASURED = Path(__file__).parent / "measured"
-SOURCE = "One NVIDIA H200, 2026-11-22: experiments/silicon/measured/README.md"
+MEASURED = Path(__file__).parent / "measured" / "unseen"
+SOURCE = "One NVIDIA H200, 2026-11-22: experiments/silicon/measured/unseen/README.md"
 SHOWN = ("instructions", "atomic instructions", TIME)
 
 
 def run(progress: Callable[[str], None]) -> Result:
     """Predict every kernel of the unseen scenes."""
     with TemporaryDirectory() as folder:
-        left_out = write_inputs(Path(folder))
+        left_out = write_inputs(Path(folder), unseen_scenes())
         widest = int(os.environ.get(WIDTH, "2048"))
-        table = compare(MEASURED, load_machine("h200"), progress, inputs=Path(folder), widest=widest, guard_band=True)
+        table = compare(
+            MEASURED,
+            load_machine("h200"),
+            progress,
+            inputs=Path(folder),
+            widest=widest,
+            guard_band=True,
+            left_out=left_out,
+        )
     walls = table[table.quantity == WALL].ours
     table = table[table.quantity != WALL]
     kernels = by_kernel(table)

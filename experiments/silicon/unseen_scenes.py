@@ -4,17 +4,14 @@ A library scene seen by its default camera, two views and three soups made here.
 what the GPU drew: a camera or a reader that changed is noticed, and the scene left out.
 """
 
-from hashlib import sha256
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.scenes import LookAt, load_scene, read_camera
-from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh
+from tilestamp.experiments.silicon.inputs import Triangles, seen_by
+from tilestamp.simulator.scenes import LookAt
 
-SIZE = (1024, 768)  # pixels: only its aspect ratio counts
 SEED = 20261122
 SOUPS = {"soup300_large": (300, 0.05, 0.6), "soup20k_small": (20000, 0.003, 0.03), "soup5k_mixed": (5000, 0.004, 0.4)}
 """Triangles, and their smallest and largest size as a part of half the screen."""
@@ -55,38 +52,20 @@ DIGESTS = {
     "soup5k_mixed": "f8bcb3226a520ac6",
     "suzanne": "22152f1542bc795e",
 }
-Triangles = tuple[NDArray[np.float32], NDArray[np.int32]]
 
 
-def write_inputs(folder: Path) -> list[str]:
-    """Write every scene to ``folder/ids`` as pipelines read them; return what was left out and why."""
-    (folder / "ids").mkdir()
-    left_out = []
+def unseen_scenes() -> dict[str, tuple[str, Callable[[], Triangles]]]:
+    """Digest of each scene, and what makes it."""
     soups = _soups()
-    for name, digest in DIGESTS.items():
-        try:
-            positions, triangles = soups[name] if name in soups else _model(name)
-        except TilestampError as error:
-            left_out.append(f"{name} is left out: {error}")
-            continue
-        if digest_of(positions, triangles) != digest:
-            left_out.append(f"{name} is left out: its triangles or its camera are not those that were measured")
-            continue
-        np.savez(folder / "ids" / f"{name}_input.npz", positions=positions, triangles=triangles)
-    return left_out
-
-
-def digest_of(positions: NDArray[np.float32], triangles: NDArray[np.int32]) -> str:
-    """Sixteen digits for the arrays of a scene."""
-    return sha256(positions.tobytes() + triangles.tobytes()).hexdigest()[:16]
+    return {
+        name: (digest, partial(soups.__getitem__, name) if name in soups else partial(_model, name))
+        for name, digest in DIGESTS.items()
+    }
 
 
 def _model(name: str) -> Triangles:
     """A library scene, by its default camera or by a view of ours."""
-    scene = load_scene(VIEWS[name][0] if name in VIEWS else name)
-    mesh = triangle_mesh(scene)
-    camera = VIEWS[name][1] if name in VIEWS else read_camera("default", scene)
-    return clip_positions(mesh, camera.matrix(*SIZE)).astype(np.float32), mesh.triangles.astype(np.int32)
+    return seen_by(*VIEWS.get(name, (name,)))
 
 
 def _soups() -> dict[str, Triangles]:

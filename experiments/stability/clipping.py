@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, Scale, atlas_result, bisect, bracket
 from tilestamp.experiments.stability.methods import MACHINE, barycentric_cover, draw, machine, plane_cover, stamp_cover
 from tilestamp.reports.maps import value_maps

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
 from tilestamp.experiments.stability.patch_frames import Split, simt_of
 from tilestamp.reports.plots import lines

@@ -8,8 +8,8 @@ ever. A queue entry of 8 bytes (ours) ends it after 14 halvings, and what is sti
 from functools import cache
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
 from tilestamp.reports.plots import lines

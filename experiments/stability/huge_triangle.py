@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.scene import Scene

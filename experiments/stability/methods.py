@@ -6,7 +6,6 @@ is the method's own rounding, not its input's.
 """
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from tilestamp import Run, simulate
 from tilestamp.models.kernel import kernel
 from tilestamp.models.machine import Machine, load_machine
+from tilestamp.models.used import remembered
 from tilestamp.simulator.reference.coverage import exact_coverage
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
@@ -49,7 +49,7 @@ class Cover(NamedTuple):
         return self.hits - int(self.mask.sum())
 
 
-@cache
+@remembered
 def machine() -> Machine:
     """Load the atlas's machine once: it draws hundreds of small pictures."""
     return load_machine(MACHINE)

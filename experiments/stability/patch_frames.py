@@ -1,7 +1,6 @@
 """What the rows about patches share: patches by formula, a frame stage by stage, and what works cost."""
 
 from collections.abc import Sequence
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
 from tilestamp.models.simt import Simt
+from tilestamp.models.used import remembered
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH, SubPatches, bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
@@ -103,7 +103,7 @@ def flat_patch(corners: ArrayLike) -> NDArray[np.float32]:
     return np.concatenate([points.reshape(1, 16, 3), np.ones((1, 16, 1))], axis=2).astype(np.float32)
 
 
-@cache
+@remembered
 def simt_of(machine: str) -> Simt:
     """Give the SIMT shape of a machine."""
     return load_machine(machine).simt

@@ -7,8 +7,8 @@ of the two grid synchronisations have none.
 
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.occupancy import residency

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.registry import Progress
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.experiments.stability.patch_frames import milliseconds, simt_of
 from tilestamp.reports.plots import lines

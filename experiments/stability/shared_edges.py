@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tilestamp.experiments.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
 from tilestamp.experiments.stability.methods import METHODS, QUADS, Cover, quad_lattice, quantized
 from tilestamp.reports.plots import lines

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price

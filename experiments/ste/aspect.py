@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.ste.setting import Model, bigguy, cube, mean_area
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.ste.setting import random_polygons
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import heat_maps

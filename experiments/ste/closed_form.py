@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.ste.setting import CONFIDENCE, random_polygons, student
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.ste.closed_form import expected
 from tilestamp.experiments.ste.setting import mean_area, random_polygons
 from tilestamp.models.errors import TilestampError

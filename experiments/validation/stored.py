@@ -18,7 +18,7 @@ from tilestamp.experiments.validation.quantities import (
     WALL_AIM,
     warm_microseconds,
 )
-from tilestamp.models.errors import TilestampError
+from tilestamp.models.errors import MissingInputError, TilestampError
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import traffic
@@ -47,6 +47,7 @@ def compare(
     inputs: Path | None = None,
     widest: int | None = None,
     guard_band: bool = False,
+    left_out: list[str] | None = None,
 ) -> "pd.DataFrame":
     """Predict what a folder of measurements holds.
 
@@ -63,6 +64,8 @@ def compare(
         Pixels: wider screens are left out.
     guard_band : bool
         Whether the CudaRaster that was measured leaves triangles whole that leave the screen by little.
+    left_out : list of str, optional
+        Takes a sentence for each scene whose model is not at hand; without it that is an error.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def compare(
     rows: list[dict[str, Any]] = []
     widths = {name: min(most, widest or most) for name, most in WIDEST.items()}
     if (folder / MICROPOLYGON).is_file():
-        rows += _rows(read(folder / MICROPOLYGON), _micropolygon(folder, machine, say), machine)
+        rows += _rows(read(folder / MICROPOLYGON), _micropolygon(folder, machine, say, left_out), machine)
     if (folder / FREEPIPE).is_file():
         rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say, widths[FREEPIPE], inputs), machine)
     if (folder / CUDARASTER).is_file():
@@ -124,7 +127,9 @@ def _tall(table: "pd.DataFrame") -> "pd.DataFrame":
     return tall.assign(source=["cupti" if name == TIME_METRIC else "ncu_cold" for name in tall.metric])
 
 
-def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tuple[Any, ...], Launch]]:
+def _micropolygon(
+    folder: Path, machine: Machine, say: Say, left_out: list[str] | None
+) -> Iterator[tuple[tuple[Any, ...], Launch]]:
     """Launches of every scene that has a camera, in its own order and shuffled."""
     mix = load_mix("micropolygon", machine.compute_capability)
     keys = read(folder / MICROPOLYGON)
@@ -133,7 +138,13 @@ def _micropolygon(folder: Path, machine: Machine, say: Say) -> Iterator[tuple[tu
         for scene in (name, name + SHUFFLED):
             if scene in measured:
                 say(scene)
-                grids = grids_of(camera, machine.simt, shuffle=scene != name)
+                try:
+                    grids = grids_of(camera, machine.simt, shuffle=scene != name)
+                except MissingInputError as missing:
+                    if left_out is None:
+                        raise
+                    left_out.append(f"{scene} is left out: {missing}")
+                    continue
                 for case in back_end(grids, camera, machine.simt, padded=scene in padded):
                     key = (scene, camera["width"], case.tile, case.spp, case.kernel)
                     yield key, mix.launch(case.work, machine.sm.warp_size)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from tilestamp.experiments.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, published
 from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import Machine, load_machine

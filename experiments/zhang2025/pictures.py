@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure

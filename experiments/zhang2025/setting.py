@@ -15,8 +15,8 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, altered, load_machine
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import load_scene
+from tilestamp.simulator.scenes.polygons import vertex_normals
 from tilestamp.simulator.scenes.scene import Mesh, Scene
-from tilestamp.simulator.scenes.textured_mesh import vertex_normals
 from tilestamp.simulator.simulation import simulate
 
 WIDTH, HEIGHT = 1920, 1080

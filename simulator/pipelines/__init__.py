@@ -31,7 +31,7 @@ def load_pipeline(name: str) -> Pipeline:
     TilestampError
         There is none of that name.
     """
-    if name not in pipeline_names():
+    if not isinstance(name, str) or name not in pipeline_names():
         raise TilestampError(f"no pipeline is called {name}; there are {', '.join(pipeline_names())}")
     module = name.replace("-", "_")
     pipeline: Pipeline = getattr(import_module(f"tilestamp.simulator.pipelines.{module}"), module)

@@ -9,6 +9,9 @@ from tilestamp.simulator.stages.laine2011.triangle_setup import SLACK, SUBTRIANG
 from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
 from tilestamp.simulator.work import Work
 
+REMARKS = {
+    "retries": "{:,} attempts of a first frame fail for want of room in a queue (-O first_frame=True prices them)"
+}
 Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name
 
 

@@ -7,11 +7,16 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.work import FixedFunctionWork, Work
+
+REMARKS = {
+    "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
+    "wrong_pixels": "{:,} pixels show another micropolygon than without the mask",
+}
 
 
 class MicropolygonInput(Options, frozen=True, kw_only=True):
@@ -32,14 +37,15 @@ def frame_of(
 ) -> Frame:
     """Gather a frame: the picture, the nearest depth of each pixel's first sample, ids of patches or triangles."""
     depth = samples.depth.reshape(samples.height, samples.width, -1)[:, :, 0]
-    found = {"micropolygons": len(polygons.patch), "dropped_polygons": polygons.dropped}
+    found = {"micropolygons": len(polygons.patch), "dropped_polygons": polygons.dropped} | facts
     return Frame(
         image=picture(samples, polygons),
         depth=np.where(np.isinf(depth), np.float32(1.0), depth),
         works=works,
         triangle_ids=visible(samples, polygons.patch),
         maps={"tests": samples.tests, "micropolygons": visible(samples)},
-        facts={**found, **facts},
+        facts=found,
+        warnings=remarks(REMARKS, found),
     )
 
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.scenes.texture import TILE, texture_chains
+from tilestamp.simulator.scenes.texture import MAX_LEVELS, TILE, texture_chains
 from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
@@ -26,6 +26,12 @@ from tilestamp.simulator.stages.zhang2025.streaming_to_frame_buffer import strea
 from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
 
+REMARKS = {
+    "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
+    "fragments lost beyond the kept ones": "{:,} fragments beyond those that a pixel can keep are lost",
+    "fragments beyond the stream's room": "{:,} fragments find no room in the original's stream",
+}
+
 
 class BinnedOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline binned."""
@@ -39,9 +45,11 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """How texels are stored."""
     texture_tile: Literal[2, 4, 8, 16] = TILE
     """Texels on a side of a storage tile."""
+    texture_levels: Annotated[int, Meta(ge=0, le=MAX_LEVELS)] = 0
+    """Levels of a texture for trilinear filtering; 0 for all. The original's current state: rows, 4 levels."""
     cull_backfaces: bool = True
     """Cull triangles that face away."""
-    fragments_a_pixel: Annotated[int, Meta(ge=0)] = KEPT
+    fragments_a_pixel: Annotated[int, Meta(ge=0, le=65536)] = KEPT
     """How many a pixel can keep; 0 for all."""
     fragment_depth: FragmentDepth = "direct"
     """How the depth that goes to the last test is evaluated: as early z does; or stepped within a quad, as the original
@@ -50,6 +58,8 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """Multiplies every alpha."""
     optimized: bool = True
     """The kernels after the optimizations that the source lists, or before."""
+    original_faults: bool = False
+    """As the original, leave out the rows beyond whole blocks of 32 (the top 24 of 1080), and a frame's fragment 0."""
 
 
 def binned(
@@ -66,7 +76,9 @@ def binned(
     mesh = geometry(scene)
     textures = scene.mesh.textures if scene.mesh else ()
     stored = options.texture_tile if options.texture_layout == "tiled" else 0
-    chains = texture_chains(textures, tile=stored, mips=options.texture_filter == "trilinear")
+    chains = texture_chains(
+        textures, tile=stored, mips=options.texture_filter == "trilinear", levels=options.texture_levels
+    )
     opaque = options.order == "api"
 
     vertices = execute(vertex_fetch_and_shading, mesh, matrix, simt).outputs
@@ -75,30 +87,42 @@ def binned(
     data = execute(triangle_setup, primitives, simt, triangles=len(mesh.triangles)).outputs
     bins = execute(primitive_binning, data.boxes, width, height, simt, triangles=len(mesh.triangles)).outputs
     tiles = execute(coarse_rasterizer, data, bins, width, height, simt, hi_z=opaque, unrolled=optimized).outputs
-    fragments = execute(fine_rasterizer, data, tiles, width, height, simt, early_z=opaque, optimized=optimized).outputs
+    fragments = execute(
+        fine_rasterizer,
+        data,
+        tiles,
+        width,
+        height,
+        simt,
+        early_z=opaque,
+        optimized=optimized,
+        whole_blocks=options.original_faults,
+    ).outputs
     stream = execute(
         pixel_shader, data, tiles, fragments, chains, mesh.texture_ids, simt,
         texture_filter=options.texture_filter, opacity=options.opacity, optimized=optimized,
     ).outputs  # fmt: skip
     pixels, (resolve,), _ = execute(
         rop, data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
-        limit=options.fragments_a_pixel, optimized=optimized,
+        limit=options.fragments_a_pixel, optimized=optimized, zero_ends=options.original_faults,
     )  # fmt: skip
     image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
 
+    facts = {
+        "primitives after culling": len(data.ids),
+        "quads": len(stream.entries),
+        "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
+        "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
+        "holes": resolve.total(RopEvent.HOLES),
+    }
     return Frame(
         image,
         pixels.depth[::-1],
         execute.works,
         triangle_ids=np.where(pixels.winners >= 0, mesh.ids[pixels.winners], -1).astype(np.int32)[::-1],
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
-        facts={
-            "primitives after culling": len(data.ids),
-            "quads": len(stream.entries),
-            "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
-            "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
-            "holes": resolve.total(RopEvent.HOLES),
-        },
+        facts=facts,
+        warnings=remarks(REMARKS, facts),
         tile=SCREEN_TILE,
         tiles_from_below=True,
     )

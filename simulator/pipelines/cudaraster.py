@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._cudaraster_facts import (
+    REMARKS,
     Counters,
     add_counters,
     fine_counters,
@@ -56,7 +57,8 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Drop triangles that face away; none: as published, on in 1.1, off in nvdiffrast."""
     guard_band: bool | None = None
     """Leave triangles whole that leave the screen by less than 2048 pixels; none: on in 1.1, off in nvdiffrast, whose
-    copies differ: some have it on."""
+    copies differ: some have it on. As in the original, a clipped triangle beside a whole one then leaves holes along
+    their edge (experiment stability/guard_band)."""
     batches: Annotated[int, Meta(ge=1, le=1024)] = 1
     """Draws that the triangles are divided among; the first clears."""
     copy_parameters: bool = False
@@ -138,7 +140,7 @@ def cudaraster(
     works = [with_parameter_copy(work) if work.kernel in copied else work for work in execute.works]
     facts = frame_facts(state.counters, state.needed, options.release, state.retries)
     if not execute.picture:
-        return Frame.numbers(works, facts)
+        return Frame.numbers(works, facts, remarks(REMARKS, facts))
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(options.msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
@@ -150,6 +152,7 @@ def cudaraster(
         ids,
         maps=state.maps,
         facts=facts,
+        warnings=remarks(REMARKS, facts),
         tile=TILE,
         tiles_from_below=True,
     )

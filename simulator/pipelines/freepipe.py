@@ -9,13 +9,20 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing
+from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing, freepipe_work
 from tilestamp.simulator.stages.liu2010.freepipe import freepipe as draw
+from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_shade import pixel_colors
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.simulator.work import Work
+
+REMARKS = {
+    "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows hangs on the packing",
+    "mixed_pixels": "{:,} pixels mix the halves of two triangles' colours",
+}
 
 
 class FreepipeOptions(Options, frozen=True, kw_only=True):
@@ -28,6 +35,10 @@ class FreepipeOptions(Options, frozen=True, kw_only=True):
     """Read the pixel before the atomic (packing 64)."""
     block: Annotated[int, Meta(ge=32, le=1024, multiple_of=32)] = BLOCK
     """Threads in a block."""
+
+    def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
+        """One kernel, of ``block`` threads."""
+        return [freepipe_work(np.zeros((0, len(FreePipeEvent)), np.int64), self.block, self.early)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,7 +81,8 @@ def freepipe(
         channels = np.stack([frame.colors >> np.uint32(8 * c) for c in (2, 1, 0)], axis=-1) & np.uint32(255)
         image = (channels * (frame.ids >= 0)[..., None]).astype(np.uint8)
     maps = {"tied_pixels": frame.tied[::-1], "mixed_pixels": frame.mixed[::-1]}
-    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], maps, dict(facts))
+    said = remarks(REMARKS, facts)
+    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], maps, dict(facts), said)
 
 
 def _flat_colors(colors: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.uint32]:

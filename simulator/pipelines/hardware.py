@@ -27,6 +27,8 @@ class HardwareOptions(Options, frozen=True, kw_only=True):
     """Sub-pixel bits."""
     depth_format: DepthFormat = "fixed32"
     """How depth is kept, in 2 or 4 bytes a pixel."""
+    guard_band: bool = True
+    """Clip in x and y only 32767 pixels out, so that what leaves the screen stays whole; false: at its borders."""
 
 
 def hardware(
@@ -50,6 +52,7 @@ def hardware(
     frame, _, facts = execute(
         draw, positions, mesh.triangles, width, height,
         cull_backfaces=options.cull_backfaces, bits=options.bits, depth_format=options.depth_format,
+        guard_band=options.guard_band,
     )  # fmt: skip
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
     return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], facts=dict(facts))

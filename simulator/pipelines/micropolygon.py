@@ -5,6 +5,7 @@ screen tiles by count, scan and write; rasterize each tile. In the hybrid the gr
 instead of the buckets.
 """
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
 from tilestamp.simulator.scenes.scene import Scene
@@ -30,9 +31,13 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import snap_edges
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
-from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, tile_raster
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
+
+REMARKS = {
+    "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn"
+}
 
 
 class MicropolygonOptions(Options, frozen=True, kw_only=True):
@@ -42,7 +47,7 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Pixels on a side of a screen tile."""
     spp: Literal[1, 4, 16] = 1
     """Samples a pixel."""
-    bound: Annotated[float, Meta(gt=0)] = 4.0
+    bound: Annotated[float, Meta(gt=0, le=4096)] = 4.0
     """Pixels that a sub-patch may be wide and high on screen."""
     bound_rule: BoundRule = "control_points"
     """How that is measured: on control points, or as whole pixels, the reading that matches the paper's counts."""
@@ -61,6 +66,11 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Give the diced grids to the fixed-function rasterizer."""
     texture: NDArray[np.uint8] | None = None
     """Laid over each patch: (H, W, 3 or 4) bytes."""
+
+    def launches(self, simt: Simt) -> list[Work]:
+        """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
+        shape = block_shape(self.tile, self.spp, simt, box_tests=self.box_tests, loaded=self.edges == "loaded")
+        return [] if self.hybrid else [raster_work(shape, np.zeros((0, len(TileRasterEvent)), np.int64))]
 
 
 def micropolygon(
@@ -109,7 +119,8 @@ def micropolygon(
     if options.snap_edges:
         grids = execute(snap_edges, points, subpatches, grids, simt, textured=texture is not None).outputs.grids
     if options.hybrid:
-        return draw_grids(execute, grids, width, height, _facts(subpatches, 0))
+        frame = draw_grids(execute, grids, width, height, _facts(subpatches, 0))
+        return replace(frame, warnings=remarks(REMARKS, frame.facts))
     count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
     start = execute(bucket_scan, count, simt).outputs
     lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
@@ -118,10 +129,11 @@ def micropolygon(
         spp=options.spp, box_tests=options.box_tests, edges=options.edges,
     )  # fmt: skip
     facts = _facts(subpatches, len(lists))
+    said = remarks(REMARKS, facts)
     if not execute.picture:
-        return Frame.numbers(execute.works, facts)
+        return Frame.numbers(execute.works, facts, said)
     maps = {} if pixels.overdraw is None else _maps(drawn[0], count, pixels.overdraw, tiles)
-    return Frame(pixels.image, pixels.depth, execute.works, maps=maps, facts=facts, tile=options.tile)
+    return Frame(pixels.image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=options.tile)
 
 
 def _maps(

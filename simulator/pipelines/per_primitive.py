@@ -18,22 +18,24 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, shaded_primitives
 
 
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
-    cull_backfaces: bool = False
-    """Leave out triangles that face away; the original's basic path does not."""
+    cull_backfaces: bool = True
+    """Leave out triangles that face away, as both published versions do."""
     race: bool = True
     """Show what the unprotected writes leave (by the model of ``per_primitive_raster``); false: what was meant."""
     perspective: bool = True
     """Perspective-correct interpolation."""
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
+    samples: Samples = "centers"
+    """Where in its pixel a sample lies: at its centre, or at its lower left corner, as in the original."""
     ssao: bool = False
-    """Screen-space ambient occlusion."""
+    """Screen-space ambient occlusion, and its blur."""
 
 
 def per_primitive(
@@ -55,11 +57,14 @@ def per_primitive(
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
-    vertices, drawable = execute(shaded_primitives, mesh, matrix, width, height, simt, parts).outputs
+    vertices, drawable = execute(
+        shaded_primitives, mesh, matrix, width, height, simt, parts, samples=options.samples
+    ).outputs
     execute(clear, width, height, 0, simt)
     meant, raced = execute(
         per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt,
         culling=options.cull_backfaces, textured=bool((mesh.texture_ids >= 0).any()),
+        samples=options.samples,
     ).outputs  # fmt: skip
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     wrong = raced.triangles != meant.triangles
@@ -67,8 +72,8 @@ def per_primitive(
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
-    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt, samples=options.samples).outputs
+    waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image = execute(
         fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     ).outputs

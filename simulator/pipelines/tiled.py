@@ -17,8 +17,8 @@ from tilestamp.simulator.stages.ru2016.ambient_occlusion import ambient_occlusio
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
-from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, tiled_raster
-from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space, shaded_primitives
+from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, raster_work, tiled_raster
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, shaded_primitives
 from tilestamp.simulator.work import Work
 
 
@@ -35,8 +35,14 @@ class TiledOptions(Options, frozen=True, kw_only=True):
     """Perspective-correct interpolation."""
     texture_filter: Filter = "bilinear"
     """How textures are filtered."""
+    samples: Samples = "centers"
+    """Where in its pixel a sample lies: at its centre, or at its lower left corner, as in the original."""
     ssao: bool = False
-    """Screen-space ambient occlusion."""
+    """Screen-space ambient occlusion, and its blur."""
+
+    def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
+        """Tiled raster has a thread a pixel of a tile."""
+        return [raster_work(np.zeros((0, len(TiledRasterEvent)), np.int64), self.tile)]
 
 
 def tiled(
@@ -54,7 +60,9 @@ def tiled(
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
     parts = draws(scene, mesh)
-    vertices, drawable = execute(shaded_primitives, mesh, matrix, width, height, simt, parts).outputs
+    vertices, drawable = execute(
+        shaded_primitives, mesh, matrix, width, height, simt, parts, samples=options.samples
+    ).outputs
     execute(clear, width, height, tiles, simt)
     lists, _, listed = execute(
         tile_lists,
@@ -74,8 +82,8 @@ def tiled(
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt).outputs
-    waits = 2 * len(parts) + (4 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt, samples=options.samples).outputs
+    waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
     image = execute(
         fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     ).outputs

@@ -22,7 +22,6 @@ from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 BYTES = ("LOAD_BYTES", "STORE_BYTES")
-MAIN_COUNTS = ("SAMPLE_TESTS", "SAMPLE_HITS")
 PAYS = 0.5  # seconds of a stage, from which on drawing and pricing a sample takes less than half of it
 
 P = ParamSpec("P")
@@ -124,12 +123,12 @@ class SampledExecutor(Executor):
         return StageResult(part.outputs, (self.works[-1],))
 
     def _measures(self, part: Part) -> Floats:
-        """What the answer is made of, of each unit that ran: instructions, cycles, main counts; (units, quantities)."""
+        """What the answer is made of, of each unit that ran: instructions, cycles, counts declared."""
         rows = part.sample.rows
         work = replace(part.stage.work(rows, **part.inputs), table=rows, streams=())
         launch = load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
         asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
-        counts = [rows[:, work.events[name]] for name in MAIN_COUNTS if name in work.events.__members__]
+        counts = [rows[:, work.events[counter.event]] for counter in work.counters if counter.kind == "count"]
         instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
         return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)
 

@@ -11,8 +11,8 @@ Boundaries: the boundary curve is the cubic B-spline of its vertices, and a corn
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.simulator.scenes.geometry import Patches
 from tilestamp.simulator.scenes.quad_cage import Cage, Points, refine, scatter_sum
-from tilestamp.simulator.scenes.scene import Patches
 
 # Places of a quad's corners and of the points around them in a 4x4 patch, row-major, corner by corner.
 CORNER_PLACES = (0, 3, 15, 12)

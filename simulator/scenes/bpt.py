@@ -1,18 +1,28 @@
 """Reader of `.bpt` files: bicubic Bezier patches that share their control points.
 
 Line 1 the patch count n; n lines of 16 comma-separated 1-based point numbers (4x4, row-major); the point count;
-that many lines ``x,y,z``, or ``x,y,z,w`` for rational points with their weight last.
+that many lines ``x,y,z``, or ``x,y,z,w`` for rational points with their weight last. Numbers may be parted by blanks.
+Or, the older form: the patch count; then for each patch a line of its two degrees, 1 to 3, and its points, row by row.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.scenes.scene import Patches
+from tilestamp.simulator.scenes.geometry import Patches
+from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 
-POINTS_PER_PATCH = 16
+POINTS_PER_PATCH, MOST_DIGITS = 16, 16
+_WORD = re.compile(r"\S+")
+# By the number of points of a Bezier curve: the matrix that makes four of them (degree elevation; Farin 2002, 6.1).
+RAISED = {
+    2: np.array([[3, 0], [2, 1], [1, 2], [0, 3]]) / 3.0,
+    3: np.array([[3, 0, 0], [1, 2, 0], [0, 2, 1], [0, 0, 3]]) / 3.0,
+    4: np.eye(4),
+}
 
 
 def read_bpt(path: str | Path) -> Patches:
@@ -35,6 +45,8 @@ def read_bpt(path: str | Path) -> Patches:
     """
     lines = _Lines(Path(path))
     patches = lines.count("patches")
+    if lines.degrees() is not None:
+        return _headed(lines, patches)
     corners = lines.table(patches, (POINTS_PER_PATCH,), np.int64, "point numbers")
     first_corner_line = lines.next_line - patches
     points = lines.count("points")
@@ -46,6 +58,23 @@ def read_bpt(path: str | Path) -> Patches:
         line = first_corner_line + int(wrong.argmax()) + 1
         raise TilestampError(f"{path}:{line}: a point number is not between 1 and {points}")
     return Patches(_homogeneous(values, path, first_point_line)[corners - 1])
+
+
+def _headed(lines: "_Lines", patches: int) -> Patches:
+    """Patches that each have a line of their degrees; lower degrees are raised to 3, which changes no point."""
+    nets = []
+    for patch in range(patches):
+        degrees = lines.degrees()
+        if degrees is None:
+            raise lines.error(lines.next_line, f"the degrees (1 to 3) of patch {patch + 1} of {patches} should be here")
+        lines.next_line += 1
+        rows, columns = (degree + 1 for degree in degrees)
+        first_line = lines.next_line + 1
+        values = lines.table(rows * columns, (3, 4), np.float64, "coordinates")
+        points = _homogeneous(values, lines.path, first_line).reshape(rows, columns, 4)
+        nets.append(np.einsum("ar,bc,rck->abk", RAISED[rows], RAISED[columns], points).reshape(16, 4))
+    lines.end()
+    return Patches(np.stack(nets).astype(np.float32))
 
 
 def homogeneous_points(values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -75,11 +104,10 @@ class _Lines:
         self.path = path
         self.next_line = 0  # 0-based
         try:
-            self.lines = path.read_text(encoding="ascii").rstrip().split("\n")
-        except OSError as error:
-            raise TilestampError(f"{path}: cannot be read ({error.strerror})") from None
+            text = plain_text(read_bytes(path)).decode("ascii").rstrip()
         except UnicodeDecodeError:
             raise TilestampError(f"{path}: is not a text file of patches") from None
+        self.lines = [",".join(_WORD.findall(line)) if "," not in line else line for line in text.split("\n")]
 
     def error(self, index: int, what: str) -> TilestampError:
         """Say what is wrong with the line of a 0-based index."""
@@ -91,10 +119,19 @@ class _Lines:
         if index >= len(self.lines):
             raise self.error(index, f"the file ends where the number of {what} should be")
         text = self.lines[index].strip()
-        if not text.isdecimal() or int(text) < 1:
+        if not (text.isdecimal() and len(text) < MOST_DIGITS and int(text)):
             raise self.error(index, f"the number of {what} should be here, not {text[:40]!r}")
         self.next_line += 1
         return int(text)
+
+    def degrees(self) -> tuple[int, int] | None:
+        """Look at a line of two degrees, from 1 to 3; None where it is none."""
+        words = self.lines[self.next_line].split(",") if self.next_line < len(self.lines) else []
+        return (
+            (int(words[0]), int(words[1]))
+            if len(words) == 2 and all(word in ("1", "2", "3") for word in words)
+            else None
+        )
 
     def table(self, rows: int, widths: tuple[int, ...], dtype: type, what: str) -> NDArray[np.float64]:
         """Take ``rows`` lines of comma-separated numbers, all of one of the ``widths``."""
@@ -121,7 +158,7 @@ class _Lines:
             parts = self.lines[index].split(",")
             try:
                 values = [dtype(part) for part in parts]
-            except ValueError:
+            except (OverflowError, ValueError):
                 values = []
             if len(values) not in widths or len(values) != width:
                 wanted = " or ".join(map(str, widths))

@@ -139,6 +139,11 @@ class FittedCamera:
         return self.look_at(width, height).matrix(width, height)
 
 
+def clip_matrix(camera: Camera, width: int, height: int) -> NDArray[np.float64]:
+    """Matrix of a camera for an image; raises TilestampError where a camera of the user's gives another thing."""
+    return _numbers(camera.matrix(width, height), (4, 4), "its matrix")
+
+
 def fit_camera(bounds: ArrayLike, up: ArrayLike = (0.0, 1.0, 0.0)) -> FittedCamera:
     """Give a camera that shows the whole of a model.
 

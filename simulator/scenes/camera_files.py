@@ -46,11 +46,9 @@ def read_camera(source: Any = None, scene: Scene | Mapping[str, Camera] | None =
         return _from_mapping(source)
     if isinstance(source, (list, tuple, np.ndarray)):
         return ModelToClip(source)
-    if isinstance(source, Camera):
+    if isinstance(source, Camera) and callable(source.matrix) and not isinstance(source, type):
         return source
-    raise TilestampError(
-        f"camera: a {type(source).__name__} is not a camera, a 4x4 matrix, a dictionary or a file name"
-    )
+    raise TilestampError(f"camera: {source!r} is not a camera, a 4x4 matrix, a dictionary or a file name")
 
 
 def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:
@@ -74,10 +72,10 @@ def _load_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TilestampError(f"{path}: the camera file cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise TilestampError(f"{path}: the camera file is not text") from None
     except json.JSONDecodeError as error:
         raise TilestampError(f"{path}:{error.lineno}: not JSON ({error.msg})") from None
+    except ValueError:
+        raise TilestampError(f"{path}: the camera file is not text") from None
 
 
 def _member(document: Any, key: str) -> Any:

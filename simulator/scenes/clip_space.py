@@ -8,20 +8,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.geometry import Mesh
+from tilestamp.simulator.scenes.notes import Notes
 
 
-def read_clip_space(path: str | Path) -> Mesh:
+def read_clip_space(path: str | Path, notes: Notes | None = None) -> Mesh:
     """Read a `.npz` of ``positions`` (V, 4) float32 in clip space and ``triangles`` (F, 3) int32."""
+    wanted = ("positions", "triangles")
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            members = {name: arrays[name] for name in arrays}
+            members: dict[str, Any] = {name: arrays[name] if name in wanted else None for name in arrays}
     except FileNotFoundError:
         raise TilestampError(f"{path}: there is no such file") from None
     except Exception:  # noqa: BLE001 (whatever zip and array readers raise, the file is to blame)
         raise TilestampError(f"{path}: is not a .npz file of plain arrays") from None
-    for name in ("positions", "triangles"):
+    for name in wanted:
         if name not in members:
             raise TilestampError(f"{path}: has no array {name!r} (it has: {', '.join(members) or 'none'})")
+    unread = ", ".join(name for name in members if name not in wanted)
+    if notes is not None:
+        notes.add_if(unread, f"arrays that are not read: {unread}")
     return clip_space_mesh(members["positions"], members["triangles"], path)
 
 

@@ -11,15 +11,15 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
-from tilestamp.simulator.scenes.clip_space import checked_mesh, read_clip_space
+from tilestamp.simulator.scenes.clip_space import read_clip_space
+from tilestamp.simulator.scenes.mesh_file import read_mesh
+from tilestamp.simulator.scenes.notes import Notes
 from tilestamp.simulator.scenes.obj_file import read_obj
+from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
 from tilestamp.simulator.scenes.quad_cage import cage_of
 from tilestamp.simulator.scenes.scene import Patches, Scene, clip_space_scene
 from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from tilestamp.simulator.scenes.subpatches import split_to_count, with_mesh
-from tilestamp.simulator.scenes.textured_mesh import read_gltf
-from tilestamp.simulator.scenes.textured_obj import read_textured_obj
-from tilestamp.simulator.scenes.triangle_mesh import mesh_from_obj, read_mesh
 from tilestamp.simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
@@ -43,7 +43,8 @@ NOT_SHIPPED = {
     "bigguy": Absent(3570, "Bay Raitt's big guy, 3570 patches", 9.117),
     "killeroo": Absent(11532, "headus's killeroo, 11532 patches", 6.688),
 }
-GLTF_SUFFIXES = (".glb", ".gltf")  # read with their textures, which trimesh would leave to its materials
+LARGE_BYTES, LARGE_TIMES = 2**25, 10  # memory above both (bytes; times the file) is worth a note
+CAGE_BYTES = 1400  # a patch, while a cage becomes patches; measured
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
 STAND_IN_SIZE = 0.9  # diagonal of its box over the model's: the cow is stouter, and must lie inside the same views
 
@@ -64,7 +65,7 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
     Returns
     -------
     Scene
-        With the model's named views, ``default`` among them.
+        With the model's named views, ``default`` among them; its note says what was skipped, guessed or left out.
 
     Raises
     ------
@@ -73,9 +74,18 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
     """
     if isinstance(source, Scene):
         return source
+    if not isinstance(source, str | Path):
+        raise TilestampError(f"a scene is a Scene, a name or a file, not {source!r}")
     path = _resolve(source, scene_path)
     name = str(source) if source in EMBEDDED else path.stem
-    return with_views(_read(name, path, kind))
+    try:
+        return with_views(_read(name, path, kind))
+    except TilestampError:
+        raise
+    except MemoryError:
+        raise TilestampError(f"{path}: needs more memory than there is") from None
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        raise TilestampError(f"{path}: is broken in a way that its reader has no sentence for ({error})") from error
 
 
 def list_scenes(scene_path: SearchPath = None) -> list[tuple[str, str]]:
@@ -135,6 +145,8 @@ def bounds(scene: Scene) -> NDArray[np.float64]:
         used = np.zeros(len(scene.mesh.positions), dtype=np.bool_)
         used[scene.mesh.triangles] = True
         homogeneous.append(scene.mesh.positions[used])
+    if not sum(map(len, homogeneous)):
+        raise TilestampError(f"the scene {scene.name} has neither patches nor triangles")
     points = np.concatenate(homogeneous).astype(np.float64)
     points = points[:, :3] / points[:, 3:]
     return np.stack([points.min(axis=0), points.max(axis=0)])
@@ -158,28 +170,43 @@ def _resolve(source: str | Path, scene_path: SearchPath) -> Path:
 def _read(name: str, path: Path, kind: Kind) -> Scene:
     if kind not in (None, "patches", "mesh"):
         raise TilestampError(f"kind must be 'patches' or 'mesh', not {kind!r}")
-    suffix = path.suffix.lower()
+    suffix, notes = path.suffix.lower(), Notes()
     if suffix == ".obj":
-        scene = _from_obj(name, path, kind)
+        scene = _from_obj(name, path, kind, notes)
     elif suffix == ".bpt":
         scene = Scene(name, patches=read_bpt(path))
     elif kind == "patches":
         raise TilestampError(f"{path}: only .bpt and .obj files can give patches")
     elif suffix == ".npz":
-        scene = clip_space_scene(read_clip_space(path), name)
-    elif suffix in GLTF_SUFFIXES:
-        scene = Scene(name, mesh=checked_mesh(read_gltf(path), path))
+        scene = clip_space_scene(read_clip_space(path, notes), name)
     else:
-        scene = Scene(name, mesh=read_mesh(path))
-    return replace(with_mesh(scene), patches=None) if kind == "mesh" else scene
+        scene = Scene(name, mesh=read_mesh(path, notes))
+    if kind == "mesh":
+        scene = replace(with_mesh(scene), patches=None)
+    _note_size(scene, path, notes)
+    return replace(scene, note="; ".join(notes))
 
 
-def _from_obj(name: str, path: Path, kind: Kind) -> Scene:
+def _note_size(scene: Scene, path: Path, notes: Notes) -> None:
+    """Say where a scene is much larger than its file."""
+    parts = [*vars(scene.mesh).values()] if scene.mesh is not None else []
+    arrays = [*parts, *(scene.mesh.textures if scene.mesh else ()), scene.patches and scene.patches.points]
+    size = sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
+    if scene.patches is not None and path.suffix.lower() == ".obj":
+        size += CAGE_BYTES * len(scene.patches.points)
+    times = size / max(path.stat().st_size, 1)
+    large = size > LARGE_BYTES and times > LARGE_TIMES
+    notes.add_if(large, f"takes {size / 1e6:,.0f} MB of memory, {times:,.0f} times the file's size")
+
+
+def _from_obj(name: str, path: Path, kind: Kind, notes: Notes) -> Scene:
     """Patches of a cage, the mesh of its polygons, or both; of an embedded cage the surface only."""
     model = read_obj(path)
     if kind == "patches" or path.parent == DATA:
+        notes += model.notes
         return Scene(name, patches=patches_from_cage(cage_of(model, path)))
-    mesh = checked_mesh(read_textured_obj(path), path) if model.textured else mesh_from_obj(model, path)
+    mesh = mesh_from_obj(model, path)
+    notes += model.notes
     mostly_quads = 2 * int((model.sizes == 4).sum()) > len(model.sizes)
     if kind == "mesh" or not mostly_quads:
         return Scene(name, mesh=mesh)

@@ -22,7 +22,7 @@ class Scene:
     patches: Patches | None = None
     mesh: Mesh | None = None
     views: Mapping[str, Camera] = field(default_factory=dict)
-    note: str = ""  # says so where the scene is a stand-in
+    note: str = ""  # what its reader skipped, guessed or could not represent; or that it is a stand-in
 
     @classmethod
     def from_clip_space(cls, positions: ArrayLike, triangles: ArrayLike, name: str = "clip-space mesh") -> "Scene":

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from tilestamp.models.errors import TilestampError
+from tilestamp.models.errors import MissingInputError
 
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
 LEVELS = 2  # of sub-folders that are looked into
@@ -42,12 +42,12 @@ def find_scene(name: str, scene_path: SearchPath = None) -> Path | None:
     return None
 
 
-def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None) -> TilestampError:
+def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None) -> MissingInputError:
     """Say that a scene is missing and where its file goes."""
     folders = ", ".join(map(str, scene_folders(scene_path)))
     where = f"one of the folders {folders}" if folders else "a folder, and name that folder"
     setting = "" if folders else f" in {SCENES_VARIABLE} (or the setting scene_path)"
-    return TilestampError(
+    return MissingInputError(
         f"scene {name!r} is neither a file nor known here ({', '.join(known)}):"
         f" put {name}.bpt, .obj, .ply, .glb or .npz into {where}{setting}"
     )

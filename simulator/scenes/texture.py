@@ -43,7 +43,9 @@ class TextureChains(NamedTuple):
     tile: int
 
 
-def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tile: int = 0, mips: bool = True) -> TextureChains:
+def texture_chains(
+    textures: Sequence[NDArray[np.uint8]], *, tile: int = 0, mips: bool = True, levels: int = 0
+) -> TextureChains:
     """Build the mip chains.
 
     Parameters
@@ -53,27 +55,30 @@ def texture_chains(textures: Sequence[NDArray[np.uint8]], *, tile: int = 0, mips
         Texels on a side of a storage tile; 0: row after row.
     mips : bool
         Whether to build levels below the first.
+    levels : int
+        How many at most; 0: down to one texel.
     """
-    levels = np.zeros((max(1, len(textures)), MAX_LEVELS, 3), np.int32)
+    most = 1 if not mips else levels or MAX_LEVELS
+    places = np.zeros((max(1, len(textures)), MAX_LEVELS, 3), np.int32)
     counts = np.ones(max(1, len(textures)), np.int32)
     parts: list[NDArray[np.float32]] = []
     first = 0
     for t, texture in enumerate(textures):
         image = texture.astype(np.float32) / np.float32(255.0)
-        chain = _chain(image) if mips else [image]
+        chain = _chain(image, most)
         counts[t] = len(chain)
         for k, level in enumerate(chain):
-            levels[t, k] = first, level.shape[1], level.shape[0]
+            places[t, k] = first, level.shape[1], level.shape[0]
             parts.append(_stored(level, tile))
             first += len(parts[-1])
     texels = np.concatenate(parts) if parts else np.ones((1, 4), np.float32)
-    return TextureChains(texels, levels, counts, tile)
+    return TextureChains(texels, places, counts, tile)
 
 
-def _chain(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
-    """All levels down to one texel."""
+def _chain(image: NDArray[np.float32], most: int) -> list[NDArray[np.float32]]:
+    """All levels down to one texel, or the first ``most``."""
     chain = [image]
-    while max(chain[-1].shape[:2]) > 1 and len(chain) < MAX_LEVELS:
+    while max(chain[-1].shape[:2]) > 1 and len(chain) < most:
         parent = chain[-1]
         rows, columns = (max(1, size // 2) for size in parent.shape[:2])
         step_r, step_c = min(2, parent.shape[0]), min(2, parent.shape[1])

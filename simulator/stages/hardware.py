@@ -3,7 +3,11 @@
 A GPU's own pipe takes primitives in order: it fetches and transforms vertices, culls, sets up, walks the 2x2 quads of
 pixels that a triangle covers, tests depth before shading, and writes what is left. Each unit has a rate in the machine
 file, and the slowest sets the time. The counts here are exact for the coverage rule of cudaraster (section 6) at
-``bits`` sub-pixel bits (8, as hardware has) and for depth tests in input order. The depth plane is evaluated in float32
+``bits`` sub-pixel bits (8, as hardware has) and for depth tests in input order. Triangles are clipped at the near and
+the far plane and, in x and y, only at a guard band (16 bits of whole pixels: the range of Direct3D 11's viewports), so
+that one that leaves the screen stays whole; quads count where they lie on the screen. A shared edge is cut for both of
+its triangles or for neither: no cracks, where a test against a band and clipping at the screen leaves some
+(experiment stability/guard_band). The depth plane is evaluated in float32
 and kept in one of the formats of graphics interfaces: 16, 24 or 32 bits of fixed point, or float32.
 """
 
@@ -18,11 +22,13 @@ from tilestamp.models.launch import Stream
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
-from tilestamp.simulator.stages.liu2010.freepipe_triangle import Pieces, make_pieces, start_edges
+from tilestamp.simulator.stages.liu2010.freepipe_triangle import SCREEN, Band, Pieces, make_pieces, start_edges
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import FixedFunctionWork
 
 SUBPIXEL_BITS = 8
 MAX_SIDE = 16384  # pixels, the limit of Direct3D 11 hardware
+GUARD_BAND = 32767  # pixels: D3D11_VIEWPORT_BOUNDS_MAX; coordinates of 16.8 bits
 STRIPS = 4  # of rows, drawn side by side
 QUADS, Z_TESTS, WRITES = 0, 1, 2  # columns of a strip's counts
 INDEX_BYTES, VERTEX_BYTES, COLOR_BYTES = 4, 32, 4
@@ -88,6 +94,7 @@ def hardware(
     cull_backfaces: bool = True,
     bits: int = SUBPIXEL_BITS,
     depth_format: DepthFormat = "fixed32",
+    guard_band: bool = True,
 ) -> StageResult[HardwareFrame]:
     """Draw triangles in input order, and count what each unit sees.
 
@@ -104,6 +111,8 @@ def hardware(
         Sub-pixel bits of the snapped corners, 4 to 8.
     depth_format : {"fixed16", "fixed24", "fixed32", "float32"}
         How depth is kept.
+    guard_band : bool
+        Clip in x and y only beyond ``GUARD_BAND`` pixels; False: at the screen's borders, and count each piece's quads.
 
     Returns
     -------
@@ -122,7 +131,7 @@ def hardware(
     """
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise TilestampError(f"size {width}x{height}: hardware draws 1 to {MAX_SIDE} pixels in each direction")
-    pieces = make_pieces(positions, triangles, width, height, bits)
+    pieces = make_pieces(positions, triangles, width, height, bits, band_of(width, height) if guard_band else SCREEN)
     depths = DEPTHS[depth_format]
     ids, depth = np.full((height, width), -1, np.int32), np.full((height, width), depths.far, np.uint32)
     counts = np.zeros((STRIPS, 3), np.int64)
@@ -132,6 +141,12 @@ def hardware(
     facts = {"rasterized": rasterized, "quad_efficiency": tests / max(4 * quads, 1)}
     works: Any = (work,)  # of fixed function
     return StageResult(HardwareFrame(ids, depth), works, facts)
+
+
+def band_of(width: int, height: int) -> Band:
+    """Half sides of the guard band about the screen's centre, in half sides of the screen."""
+    across, along = ((GUARD_BAND - side / 2) / (side / 2) for side in (width, height))
+    return np.float32(across), np.float32(along)
 
 
 def hardware_grids(
@@ -197,4 +212,7 @@ def _work(
         Stream("frame", "store", writes * COLOR_BYTES, writes * COLOR_BYTES),
     )
     events = {"RASTERIZED": rasterized, "SAMPLE_TESTS": 4 * quads, "SAMPLE_HITS": tests}
-    return FixedFunctionWork(stage="hardware", kernel="draw", items=items, events=events, streams=streams), rasterized
+    work = FixedFunctionWork(
+        stage="hardware", kernel="draw", items=items, events=events, streams=streams, counters=SAMPLE_COUNTERS
+    )
+    return work, rasterized

@@ -3,7 +3,7 @@
 import sys
 
 from tests.ledger import book, cells, frames
-from tilestamp.experiments.registry import experiment_names
+from tilestamp.experiments.harness.registry import experiment_names
 from tilestamp.simulator.pipelines import pipeline_names
 
 

@@ -5,7 +5,7 @@ compared only where they are.
 """
 
 from tests.ledger.book import Entries
-from tilestamp.experiments.registry import load_experiment
+from tilestamp.experiments.harness.registry import load_experiment
 
 HEADER = ("row", "column", "unit", "what", "value")
 

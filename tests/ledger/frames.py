@@ -33,8 +33,14 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"release": "nvdiffrast", "copy_parameters": True}),
     ),
     "stamps": (("gtx280", {"stamp": 4, "touch": "polygon", "spp": 4}), ("h200", {"coarse": 16, "triangles": True})),
-    "tiled": (("gtx680", {"tile": 16, "capacity": "original"}), ("gtx680", {"tile": 32, "ssao": True})),
-    "per-primitive": (("gtx680", {"cull_backfaces": True, "ssao": True}),),
+    "tiled": (
+        ("gtx680", {"tile": 16, "capacity": "original"}),
+        ("gtx680", {"tile": 32, "ssao": True}),
+        ("h200", {"samples": "corners", "ssao": True}),
+    ),
+    "per-primitive": (("gtx680", {"cull_backfaces": False, "ssao": True}), ("h200", {"samples": "corners"})),
+    "binned": (("h200", {"original_faults": True, "texture_layout": "rows", "texture_levels": 4}),),
+    "hardware": (("h200", {"guard_band": False}),),
 }
 
 

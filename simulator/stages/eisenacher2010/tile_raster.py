@@ -166,6 +166,11 @@ def _work(
 ) -> Work:
     """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
     shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+    return raster_work(shape, table, _streams(table, lists, len(vertices), shape, simt))
+
+
+def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
+    """Work of the kernel, a row a tile."""
     return Work(
         stage="tile_raster",
         kernel="tile_raster",
@@ -174,7 +179,7 @@ def _work(
         grid=len(table),
         block=shape.tile**2,
         shared_bytes=shared_bytes(shape),
-        streams=_streams(table, lists, len(vertices), shape, simt),
+        streams=streams,
         variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
     )
 

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from tilestamp.models.banks import bank_passes
 from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing, Simt
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve_replays
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import QUADS
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
 VERTICES = 16  # a grid
 VECTOR_BYTES = 16  # a vertex; and the width of a load
@@ -28,6 +30,7 @@ EDGE_LOADS = 3  # vectors that each lane reads for the edges of a quad
 _HALF_WARP = int(Coalescing.HALF_WARP_SEGMENTS)
 
 
+@shown(*SAMPLE_COUNTERS, distribution("grids", "GRIDS", "grids in the list of a tile"))
 class TileRasterEvent(IntEnum):
     """Events of one block, which is one tile.
 

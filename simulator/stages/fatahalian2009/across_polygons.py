@@ -15,6 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from tilestamp.models.coalescing import contiguous
+from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -28,6 +29,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     pixel_box,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 Packing = Literal["in-order", "sorted", "repacked"]
@@ -38,6 +40,7 @@ SORT_STEPS = 36  # compare-exchange steps of a bitonic sort of 256 keys: 8 * 9 /
 BOX = 5  # columns of a lane's walk: x0, y0, x1, y1, and samples done
 
 
+@shown(*SAMPLE_COUNTERS)
 class AcrossPolygonsEvent(IntEnum):
     """Events of one chunk of polygons."""
 

@@ -11,17 +11,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
 CHUNK = 256  # polygons of a unit of work
 MOST_SAMPLES = 1024  # a pixel
 
 
+@shown(*SAMPLE_COUNTERS)
 class MotionEvent(IntEnum):
     """Events of one chunk of moving polygons."""
 

@@ -39,7 +39,7 @@ def sample_positions(spp: int, file: str | Path | None = None) -> NDArray[np.int
         patterns = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TilestampError(f"{path}: cannot be read ({error.strerror})") from None
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # no TOML, no text or no path
         raise TilestampError(f"{path}: {error}") from None
     if str(spp) not in patterns:
         raise TilestampError(f"{path}: there is no pattern of {spp} samples")

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tilestamp.models.coalescing import contiguous
+from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -36,6 +37,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     on_screen,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 Touch = Literal["box", "polygon"]
@@ -43,6 +45,7 @@ CHUNK = 256  # polygons that a warp draws from the queue
 WARPS = 4  # in a block
 
 
+@shown(*SAMPLE_COUNTERS)
 class StampsEvent(IntEnum):
     """Events of one chunk of polygons."""
 

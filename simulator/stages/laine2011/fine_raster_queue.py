@@ -6,11 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tilestamp.models.coalescing import contiguous, smallest_transaction_bytes, transactions
+from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
 from tilestamp.simulator.stages.laine2011.exact import lowest_bit, popcount
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
 TILE = 8  # pixels
 PIXELS = TILE * TILE
@@ -21,6 +23,7 @@ ENTRY_BYTES = 4
 HEADER_BYTES = 16
 
 
+@shown(*SAMPLE_COUNTERS, distribution("triangles", "ENTRY_LANES", "triangles in the list of a tile that has some"))
 class FineRasterEvent(IntEnum):
     """Events of one tile, drawn by one warp. LANES are active lanes; all else counts warp executions or pixels."""
 

@@ -244,16 +244,25 @@ def _make_work(
         Stream("positions", "load", 3 * 16 * len(triangles), positions.nbytes),
         Stream("frame", "atomic", served, CHUNK_BYTES * int(np.count_nonzero(requests))),
     )
+    return freepipe_work(table, block, early, streams, requests)
+
+
+def freepipe_work(
+    table: NDArray[np.int64],
+    block: int,
+    early: bool,
+    streams: tuple[Stream, ...] = (),
+    requests: NDArray[np.int64] | None = None,
+) -> Work:
+    """Work of the kernel, a row a block."""
     kernel = "freepipe_early" if early else "freepipe"
     return Work(
         stage="freepipe",
         kernel=kernel,
-        events=E,
+        events=FreePipeEvent,
         table=table,
-        grid=blocks,
+        grid=len(table),
         block=block,
-        shared_bytes=0,
-        dispatch="blocks",
         streams=streams,
         atomic_requests=requests,
     )

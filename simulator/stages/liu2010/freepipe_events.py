@@ -2,7 +2,11 @@
 
 from enum import IntEnum
 
+from tilestamp.models.counters import shown
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
+
+@shown(*SAMPLE_COUNTERS)
 class FreePipeEvent(IntEnum):
     """Events of one block, a column each."""
 

@@ -21,6 +21,8 @@ SUBPIXEL_BITS = 4
 MAX_POLYGON = 10
 _PART_TRIANGLES = 4096  # at least
 _F0, _F1 = np.float32(0), np.float32(1)
+Band = tuple[np.float32, np.float32]
+SCREEN: Band = (_F1, _F1)  # the screen's own borders
 
 
 class Pieces(NamedTuple):
@@ -35,20 +37,22 @@ class Pieces(NamedTuple):
 
 
 @kernel
-def _distance(p, plane):
-    """Signed distance to a clip plane, in the order +x -x +y -y +z -z."""
-    c = p[plane // 2]
-    return p[3] + c if plane % 2 == 0 else p[3] - c
+def _distance(p, plane, band):
+    """Signed distance to a clip plane, in the order +x -x +y -y +z -z; x and y as far out as the band's half sides."""
+    axis = plane // 2
+    w = p[3] if axis == 2 else p[3] * band[axis]
+    return w + p[axis] if plane % 2 == 0 else w - p[axis]
 
 
 @kernel
-def _is_inside(p):
-    largest = _F0  # the maximum of magnitudes, which ignores a NaN
-    for c in range(3):
-        magnitude = abs(p[c])
-        if magnitude > largest:  # noqa: PLR1730 - max() may hand a NaN on
-            largest = magnitude
-    return p[3] >= largest
+def _is_inside(p, band):
+    if not p[3] >= _F0:
+        return False
+    for axis in range(3):
+        w = p[3] if axis == 2 else p[3] * band[axis]
+        if abs(p[axis]) > w:  # a NaN is ignored
+            return False
+    return True
 
 
 @kernel
@@ -59,7 +63,7 @@ def _copy(source, target):
 
 
 @kernel(error_model="numpy")
-def _clip(polygon, spare):
+def _clip(polygon, spare, band):
     """Clip a triangle by all six planes in turn; returns the polygon's vertices."""
     n = 3
     for plane in range(PLANES):
@@ -67,9 +71,9 @@ def _clip(polygon, spare):
             break
         kept = 0
         a = n - 1
-        a_far = _distance(polygon[a], plane)
+        a_far = _distance(polygon[a], plane, band)
         for b in range(n):
-            b_far = _distance(polygon[b], plane)
+            b_far = _distance(polygon[b], plane, band)
             if a_far * b_far < _F0:
                 s = a_far / (a_far - b_far)
                 for c in range(4):
@@ -86,18 +90,18 @@ def _clip(polygon, spare):
 
 
 @kernel
-def _classify(polygon, spare):
+def _classify(polygon, spare, band):
     """Clip in place; returns what the thread does and how many pieces it scans."""
-    if _is_inside(polygon[0]) and _is_inside(polygon[1]) and _is_inside(polygon[2]):
+    if _is_inside(polygon[0], band) and _is_inside(polygon[1], band) and _is_inside(polygon[2], band):
         return INSIDE, 1
     for plane in range(PLANES):
         if (
-            _distance(polygon[0], plane) < _F0
-            and _distance(polygon[1], plane) < _F0
-            and _distance(polygon[2], plane) < _F0
+            _distance(polygon[0], plane, SCREEN) < _F0
+            and _distance(polygon[1], plane, SCREEN) < _F0
+            and _distance(polygon[2], plane, SCREEN) < _F0
         ):
             return NOTHING, 0
-    return CLIPPED, max(_clip(polygon, spare) - 2, 0)
+    return CLIPPED, max(_clip(polygon, spare, band) - 2, 0)
 
 
 @kernel
@@ -141,11 +145,11 @@ def _piece(vertices, width, height, bits, corner, box, depth):
 
 
 @kernel
-def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces):
+def _thread(positions, triangles, t, width, height, bits, band, polygon, spare, fan, pieces):
     """Clip triangle t and count its pieces; write them where ``pieces`` is given."""
     for k in range(3):
         _copy(positions[triangles[t, k]], polygon[k])
-    kind, n = _classify(polygon, spare)
+    kind, n = _classify(polygon, spare, band)
     if pieces is not None:
         for i in range(n):
             for k in range(3):
@@ -156,18 +160,18 @@ def _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, p
 
 
 @kernel
-def _classify_part(part, parts, positions, triangles, kind, count):
+def _classify_part(part, parts, positions, triangles, band, kind, count):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     for t in range(kind.size * part // parts, kind.size * (part + 1) // parts):
-        kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, polygon, spare, polygon, None)
+        kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, band, polygon, spare, polygon, None)
 
 
 @kernel
-def _project_part(part, parts, positions, triangles, width, height, bits, pieces):
+def _project_part(part, parts, positions, triangles, width, height, bits, band, pieces):
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     fan = np.empty((3, 4), np.float32)
     for t in range(pieces.kind.size * part // parts, pieces.kind.size * (part + 1) // parts):
-        _thread(positions, triangles, t, width, height, bits, polygon, spare, fan, pieces)
+        _thread(positions, triangles, t, width, height, bits, band, polygon, spare, fan, pieces)
 
 
 @kernel
@@ -193,7 +197,12 @@ def fixed_depth(z):
 
 
 def make_pieces(
-    positions: NDArray[np.float32], triangles: NDArray[np.int32], width: int, height: int, bits: int = SUBPIXEL_BITS
+    positions: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    width: int,
+    height: int,
+    bits: int = SUBPIXEL_BITS,
+    band: Band = SCREEN,
 ) -> Pieces:
     """Do every thread's work up to the scan.
 
@@ -206,6 +215,8 @@ def make_pieces(
         Pixels.
     bits : int
         Sub-pixel bits of the snapped corners.
+    band : tuple of float32
+        Where triangles are clipped in x and y, in half sides of the screen.
 
     Raises
     ------
@@ -216,10 +227,10 @@ def make_pieces(
         raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     parts = parts_of(len(triangles), _PART_TRIANGLES)
     kind, count = np.zeros(len(triangles), np.uint8), np.zeros(len(triangles), np.int64)
-    for_parts(_classify_part, parts, positions, triangles, kind, count)
+    for_parts(_classify_part, parts, positions, triangles, band, kind, count)
     first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
     total = int(first[-1])
     corner, box = np.zeros((total, 6), np.int32), np.zeros((total, 4), np.int32)
     pieces = Pieces(kind, first, corner, box, np.zeros(total, np.int8), np.zeros((total, 3), np.float32))
-    for_parts(_project_part, parts, positions, triangles, width, height, bits, pieces)
+    for_parts(_project_part, parts, positions, triangles, width, height, bits, band, pieces)
     return pieces

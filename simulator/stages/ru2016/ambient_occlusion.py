@@ -1,8 +1,9 @@
 """Screen-space ambient occlusion (Ru 2016, "SSAO"): 64 samples, 4x4 noise, linear depth.
 
 Samples of the upper hemisphere are turned about its axis by the noise of the pixel, lifted to the eye-space normal,
-and projected; a sample is occluded if the pixel there is before it. "Need to use linear depth." The cost is that of
-the screen: it does not depend on the scene. The sample pattern, the radius and the range check are ours: he names none.
+and projected; a sample is occluded if the pixel there is before it. "Need to use linear depth." A second kernel blurs
+(``occlusion_blur``). The cost is that of the screen, whatever the scene. The sample pattern, the radius and
+the range check are ours: he names none.
 """
 
 from typing import Any
@@ -17,7 +18,8 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
-from tilestamp.simulator.stages.ru2016.vertex_shading import EyeSpace
+from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
+from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, EyeSpace, Samples
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 
 SAMPLES = 64
@@ -47,12 +49,14 @@ def noise() -> NDArray[np.float32]:
 
 
 @kernel(error_model="numpy")
-def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int, y: int, radius: Any) -> int:
+def _occluded(
+    w: Any, normal: Any, turn: Any, samples: Any, scales: Any, shift: Any, x: int, y: int, radius: Any
+) -> int:
     """Count the samples of one pixel that lie behind what is drawn there."""
     height, width = w.shape
     distance = w[y, x] / scales[2]
-    px = ((np.float32(x) + _HALF) / np.float32(width) * np.float32(2.0) - _ONE) * w[y, x] / scales[0]
-    py = (_ONE - (np.float32(y) + _HALF) / np.float32(height) * np.float32(2.0)) * w[y, x] / scales[1]
+    px = ((np.float32(x) + _HALF - shift[0]) / np.float32(width) * np.float32(2.0) - _ONE) * w[y, x] / scales[0]
+    py = (_ONE - (np.float32(y) + _HALF - shift[1]) / np.float32(height) * np.float32(2.0)) * w[y, x] / scales[1]
     nx, ny, nz = normal[0], normal[1], normal[2]
     # a frame around the normal (Duff et al. 2017)
     sign = _ONE if nz >= _ZERO else -_ONE
@@ -68,8 +72,8 @@ def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int,
         deep = distance - (-u * sign * nx - v * ny + n * nz)
         if deep <= _ZERO:
             continue
-        column = int(np.floor((sx * scales[0] / (deep * scales[2]) + _ONE) * _HALF * np.float32(width)))
-        line = int(np.floor((_ONE - sy * scales[1] / (deep * scales[2])) * _HALF * np.float32(height)))
+        column = int(np.floor((sx * scales[0] / (deep * scales[2]) + _ONE) * _HALF * np.float32(width) + shift[0]))
+        line = int(np.floor((_ONE - sy * scales[1] / (deep * scales[2])) * _HALF * np.float32(height) + shift[1]))
         if 0 <= column < width and 0 <= line < height and w[line, column] > _ZERO:
             drawn = w[line, column] / scales[2]
             if drawn < deep - BIAS * radius and distance - drawn < radius:
@@ -78,24 +82,30 @@ def _occluded(w: Any, normal: Any, turn: Any, samples: Any, scales: Any, x: int,
 
 
 @kernel(error_model="numpy")
-def _row(w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, y: int, light: Any) -> None:
+def _row(
+    w: Any, normals: Any, turns: Any, samples: Any, scales: Any, shift: Any, relative: Any, y: int, light: Any
+) -> None:
+    """Light of one row of pixels."""
     for x in range(w.shape[1]):
         if w[y, x] > _ZERO:
             radius = relative * w[y, x] / scales[2]
-            found = _occluded(w, normals[y, x], turns[y % NOISE, x % NOISE], samples, scales, x, y, radius)
+            found = _occluded(w, normals[y, x], turns[y % NOISE, x % NOISE], samples, scales, shift, x, y, radius)
             light[y, x] = _ONE - np.float32(found) / np.float32(len(samples))
 
 
 @kernel(error_model="numpy")
 def _ambient_occlusion(
-    part: int, parts: int, w: Any, normals: Any, turns: Any, samples: Any, scales: Any, relative: Any, light: Any
-) -> None:
+    part: int, parts: int, w: Any, normals: Any, turns: Any, samples: Any, scales: Any, shift: Any, relative: Any,
+    light: Any,
+) -> None:  # fmt: skip
     """Light of a share of the rows."""
     for y in range(part * len(w) // parts, (part + 1) * len(w) // parts):
-        _row(w, normals, turns, samples, scales, relative, y, light)
+        _row(w, normals, turns, samples, scales, shift, relative, y, light)
 
 
-def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> StageResult[NDArray[np.float32]]:
+def ambient_occlusion(
+    fragments: Fragments, eye: EyeSpace, simt: Simt, *, samples: Samples = "centers"
+) -> StageResult[NDArray[np.float32]]:
     """Find how much light reaches each pixel.
 
     Parameters
@@ -103,12 +113,14 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> StageR
     fragments : Fragments
     eye : EyeSpace
     simt : Simt
+    samples : {"centers", "corners"}
+        Where in its pixel a fragment lies (``vertex_shading``).
 
     Returns
     -------
     outputs : ndarray, (H, W), float32
-        Share of the light that is left: 1 where nothing occludes.
-    works : one
+        Share of the light that is left: 1 where nothing occludes; blurred.
+    works : the occlusion and the blur
 
     Raises
     ------
@@ -120,9 +132,10 @@ def ambient_occlusion(fragments: Fragments, eye: EyeSpace, simt: Simt) -> StageR
     light = np.ones(fragments.w.shape, np.float32)
     for_parts(
         _ambient_occlusion, parts_of(len(light)), fragments.w, fragments.normals, noise(), hemisphere(), eye.scales,
-        np.float32(RADIUS), light,
+        SHIFTS[samples], np.float32(RADIUS), light,
     )  # fmt: skip
     loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
     stores = (Access("occlusion", 4, 1),)
-    work = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
-    return StageResult(light, (work,))
+    occlusion = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    light, blur, _ = occlusion_blur(light, simt)
+    return StageResult(light, (occlusion, *blur))

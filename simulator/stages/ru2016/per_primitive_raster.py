@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FA
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
 from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
+from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, Samples
 from tilestamp.simulator.work import Work
 
 START_LOADS = 9  # x, y and z of three vertices
@@ -60,6 +61,7 @@ def per_primitive_raster(
     *,
     culling: bool,
     textured: bool = False,
+    samples: Samples = "centers",
 ) -> StageResult[tuple[Visible, Race]]:
     """Draw triangle by triangle.
 
@@ -74,6 +76,8 @@ def per_primitive_raster(
     culling : bool
     textured : bool
         Whether fragments carry texture coordinates.
+    samples : {"centers", "corners"}
+        Where in its pixel a sample lies (``vertex_shading``).
 
     Returns
     -------
@@ -90,7 +94,7 @@ def per_primitive_raster(
     requests = np.zeros(width * height // 8 + 1, np.int64)
     resident = simt.sms * (THREADS_AN_SM // simt.warp)
     walk(
-        (screen, triangles, drawable),
+        (screen, triangles, drawable, SHIFTS[samples]),
         culling,
         int(simt.atomic_merge),
         walkers(resident, simt.warp),

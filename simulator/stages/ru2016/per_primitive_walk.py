@@ -8,7 +8,7 @@ from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent
-from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside, pixel_box
+from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, border_box, corners, inside
 
 RACE_ROUNDS = 3  # assumed
 DEPTH_SCALE = np.float64(2**31 - 1)  # depths are compared as integers
@@ -25,7 +25,7 @@ def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events:
     Parameters
     ----------
     mesh : tuple
-        Shaded vertices, triangles, those to draw.
+        Shaded vertices, triangles, those to draw, and how far the vertices were moved for samples at corners.
     culling, merge
     warps : Walkers
     buffers : tuple
@@ -106,9 +106,10 @@ def _column(boxes: Any, w: int, column: int, place: Any, present: Any) -> None:
 
 @kernel(error_model="numpy")
 def _boxes(
-    screen: Any, triangles: Any, drawable: Any, first: int, shape: Any, culling: bool, boxes: Any, shapes: Any, row: Any
-) -> None:
-    """Cull, and find each lane's box of pixels and what does not change over it."""
+    screen: Any, triangles: Any, drawable: Any, shift: Any, first: int, shape: Any, culling: bool, boxes: Any,
+    shapes: Any, row: Any,
+) -> None:  # fmt: skip
+    """Cull, and find each lane's box of pixels, by the vertices' own places, and what does not change over it."""
     for lane in range(len(boxes)):
         if first + lane >= len(drawable):
             break
@@ -121,9 +122,9 @@ def _boxes(
             if row is not None:
                 row[PerPrimitiveEvent.CULLED] += 1
             continue
-        left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, shape[1], shape[0])
-        if left > right or top > bottom:
-            continue
+        left, right, top, bottom = border_box(
+            x0 - shift[0], y0 - shift[1], x1 - shift[0], y1 - shift[1], x2 - shift[0], y2 - shift[1], shape[1], shape[0]
+        )
         boxes[lane, 0] = left
         boxes[lane, 1] = right - left + 1
         boxes[lane, 2] = top

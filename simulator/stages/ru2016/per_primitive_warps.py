@@ -5,9 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tilestamp.models.counters import shown
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
+
 BLOCK = 128  # threads
 
 
+@shown(*SAMPLE_COUNTERS)
 class PerPrimitiveEvent(IntEnum):
     """Events of one block."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
+from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -23,6 +24,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
@@ -38,6 +40,7 @@ _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
 
 
+@shown(*SAMPLE_COUNTERS)
 class TiledRasterEvent(IntEnum):
     """Events of one block, that is of one tile."""
 
@@ -193,16 +196,20 @@ def tiled_raster(
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
         ),
     )
-    work = Work(
+    return StageResult(visible, (raster_work(events, tile, streams),))
+
+
+def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...] = ()) -> Work:
+    """Work of the kernel, a row and a block a tile, a thread a pixel."""
+    return Work(
         stage="tiled_raster",
         kernel="tiled_raster",
         events=TiledRasterEvent,
-        table=events,
-        grid=tiles,
+        table=table,
+        grid=len(table),
         block=tile * tile,
         streams=streams,
     )
-    return StageResult(visible, (work,))
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:

@@ -40,6 +40,23 @@ def inside(a: Any, b: Any, c: Any) -> Any:
 
 
 @kernel(error_model="numpy")
+def _column(coordinate: Any, size: int) -> int:
+    """Column or row of a coordinate, the nearest border's where it lies outside."""
+    return int(min(max(coordinate, _ZERO), np.float32(size - 1)))
+
+
+@kernel(error_model="numpy")
+def border_box(
+    x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """As ``pixel_box``, but a triangle beside the screen has a column or row of its border, as in the original."""
+    return (
+        _column(min(x0, x1, x2), width), _column(max(x0, x1, x2), width),
+        _column(min(y0, y1, y2), height), _column(max(y0, y1, y2), height),
+    )  # fmt: skip
+
+
+@kernel(error_model="numpy")
 def pixel_box(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
 ) -> tuple[int, int, int, int]:

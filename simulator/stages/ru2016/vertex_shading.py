@@ -5,11 +5,15 @@ into its primitive. Both kernels run 128 threads a block, and are launched for e
 host waiting after each (an engine of 115 parts: 230 launches). The original does not clip: a triangle with a vertex
 behind the eye (w <= 0) is garbage there and is dropped here, and counted.
 
+Samples lie at the centres of pixels here. In the original they lie at integer coordinates, y up: half a pixel left of
+and below them (``samples="corners"``). Tiles there are bounded halfway between samples, so all else is as if every
+vertex were half a pixel further right and up, and that is what is done: lists and coverage then are the original's.
+
 The pipeline is given one model-to-clip matrix; its rows give the eye's axes, since for a perspective without skew
 row 0 is the right axis, row 1 the up axis and row 3 the forward axis, each times a factor.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +29,11 @@ BLOCK = 128  # threads
 VERTEX_BYTES = 64  # position, eye position, eye normal, texture coordinate, texture pointer and size
 PRIMITIVE_BYTES = 3 * VERTEX_BYTES + 8  # three vertices and a type, padded to the alignment of the pointers
 INDEX_BYTES = 2
+Samples = Literal["centers", "corners"]
+SHIFTS = {  # of vertices on the screen, pixels right and down
+    "centers": (np.float32(0.0), np.float32(0.0)),
+    "corners": (np.float32(0.5), np.float32(-0.5)),
+}
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
 
@@ -70,7 +79,7 @@ def eye_space(matrix: NDArray[Any]) -> EyeSpace:
 
 @kernel(error_model="numpy")
 def _vertex_shading(
-    positions: Any, normals: Any, matrix: Any, axes: Any, width: Any, height: Any, screen: Any, eye_normals: Any
+    positions: Any, normals: Any, matrix: Any, axes: Any, size: Any, shift: Any, screen: Any, eye_normals: Any
 ) -> None:
     """Transform every vertex."""
     for v in range(len(positions)):
@@ -80,8 +89,8 @@ def _vertex_shading(
         cz = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3] * w0
         w = matrix[3, 0] * x + matrix[3, 1] * y + matrix[3, 2] * z + matrix[3, 3] * w0
         inverse = _ONE / w if w > np.float32(0.0) else np.float32(0.0)
-        screen[v, 0] = (cx * inverse + _ONE) * _HALF * width
-        screen[v, 1] = (_ONE - cy * inverse) * _HALF * height
+        screen[v, 0] = (cx * inverse + _ONE) * _HALF * size[0] + shift[0]
+        screen[v, 1] = (_ONE - cy * inverse) * _HALF * size[1] + shift[1]
         screen[v, 2] = (cz * inverse + _ONE) * _HALF
         screen[v, 3] = inverse
         for k in range(3):
@@ -89,7 +98,14 @@ def _vertex_shading(
 
 
 def vertex_shading(
-    mesh: Geometry, matrix: NDArray[Any], width: int, height: int, simt: Simt, parts: NDArray[np.int64] | None = None
+    mesh: Geometry,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    parts: NDArray[np.int64] | None = None,
+    *,
+    samples: Samples = "centers",
 ) -> StageResult[ShadedVertices]:
     """Transform vertices to the screen, normals to eye space.
 
@@ -103,6 +119,8 @@ def vertex_shading(
     simt : Simt
     parts : ndarray, (D, 2), int64, or None
         Vertices and triangles of each draw.
+    samples : {"centers", "corners"}
+        Where in its pixel a sample lies: at its centre, or at its lower left corner, as the original's.
 
     Returns
     -------
@@ -116,8 +134,8 @@ def vertex_shading(
         mesh.normals,
         np.ascontiguousarray(matrix, np.float32),
         eye_space(matrix).axes,
-        np.float32(width),
-        np.float32(height),
+        (np.float32(width), np.float32(height)),
+        SHIFTS[samples],
         *out,
     )
     sizes = [count] if parts is None else parts[:, 0].tolist()
@@ -148,10 +166,17 @@ def primitive_assembly(
 
 
 def shaded_primitives(
-    mesh: Geometry, matrix: NDArray[Any], width: int, height: int, simt: Simt, parts: NDArray[np.int64] | None = None
+    mesh: Geometry,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    parts: NDArray[np.int64] | None = None,
+    *,
+    samples: Samples = "centers",
 ) -> StageResult[tuple[ShadedVertices, NDArray[np.int32]]]:
     """Vertex shading and primitive assembly, one after the other for each draw; parameters of ``vertex_shading``."""
-    vertices, shading, _ = vertex_shading(mesh, matrix, width, height, simt, parts)
+    vertices, shading, _ = vertex_shading(mesh, matrix, width, height, simt, parts, samples=samples)
     drawable, assembly, _ = primitive_assembly(mesh, vertices, simt, parts)
     return StageResult(
         (vertices, drawable), tuple(work for pair in zip(shading, assembly, strict=True) for work in pair)

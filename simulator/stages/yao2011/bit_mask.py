@@ -19,6 +19,7 @@ import numpy as np
 
 from tilestamp.models.atomics import count_atomics
 from tilestamp.models.coalescing import contiguous
+from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -33,6 +34,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     pixel_box,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.stages.yao2011.bit_mask_words import new_mask, next_word, patch_box
 from tilestamp.simulator.work import Work
 
@@ -43,6 +45,7 @@ SHARED_WORDS = 512  # mask words of a warp in shared memory; larger masks lie in
 LANE = 8  # columns of a lane's walk: x0, y0, x1, y1 in pixels, row, next word, pending bits, mask layer
 
 
+@shown(*SAMPLE_COUNTERS)
 class BitMaskEvent(IntEnum):
     """Events of one patch."""
 

@@ -3,7 +3,9 @@
 A warp a tile; blocks of 4 tiles after optimization, of 1 before. In rounds of 32 primitives each lane takes one: 64-bit
 coverage from three float edge functions, stepped pixel by pixel as in the original, then 64 serial steps of early z, a
 shared atomicMin for each covered pixel. Quads with a live pixel go to the fragment stream, which one atomicAdd a warp
-and round allots; after optimization four lanes write a quad, before it each lane writes all of its own quads.
+and round allots; after optimization four lanes write a quad, before it each lane writes all of its own quads. Here all
+rows of tiles are drawn; the original divides their number by the block's 4 and drops the rest: for 1080 rows of pixels
+it launches 33 rows of blocks, and never draws the top 24 (``whole_blocks``).
 
 Lanes reach a pixel in the same step and the atomic serves them in lane order, so early z goes in primitive order.
 """
@@ -63,7 +65,15 @@ def _fine_rasterizer(
 
 
 def fine_rasterizer(
-    data: TriangleSetupData, tiles: TileQueues, width: int, height: int, simt: Simt, *, early_z: bool, optimized: bool
+    data: TriangleSetupData,
+    tiles: TileQueues,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    early_z: bool,
+    optimized: bool,
+    whole_blocks: bool = False,
 ) -> StageResult[TileFragments]:
     """Rasterize all tiles.
 
@@ -78,6 +88,8 @@ def fine_rasterizer(
         Whether early z rejects (not with transparency).
     optimized : bool
         Blocks of four tiles and four lanes a quad; or the kernel before that.
+    whole_blocks : bool
+        Launch whole blocks of four tiles only, as the original does: rows of tiles beyond them are never drawn.
 
     Returns
     -------
@@ -85,6 +97,7 @@ def fine_rasterizer(
     works : one
     """
     rows, columns = -(-height // TILE), -(-width // TILE)
+    rows -= rows % TILES_A_BLOCK if whole_blocks and optimized else 0
     out = TileFragments(np.zeros(len(tiles.entries), np.uint64), np.full((height, width), NO_DEPTH, np.uint32))
     events = np.zeros((rows, columns, len(FineRasterizerEvent)), np.int64)
     for_parts(

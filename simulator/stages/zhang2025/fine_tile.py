@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.depth import depth_24_bit
 from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
@@ -15,6 +17,7 @@ _HALF = np.float32(0.5)
 _ZERO = np.float32(0.0)
 
 
+@shown(*SAMPLE_COUNTERS)
 class FineRasterizerEvent(IntEnum):
     """Events of one block."""
 

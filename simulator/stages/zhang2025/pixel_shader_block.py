@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.coalescing import transactions
+from tilestamp.models.counters import shown, size
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.scenes.texture import (
     TEXEL_BYTES,
@@ -28,6 +29,7 @@ _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
 
 
+@shown(size("TEXTURE_BYTES", "bytes of the segments that texels are read in"))
 class PixelShaderEvent(IntEnum):
     """Events of one block."""
 

@@ -3,6 +3,10 @@
 One thread a primitive, 256 a block. A mask of 256 bins a thread is transposed by 256 ballots a warp; each thread then
 owns a bin, scans the block's counts, and one thread takes room in the queue by one global atomicAdd a block, in chunks
 of 64 entries. The queue of a bin keeps the order of the primitives.
+
+In the original a thread reads the queue's base, which another thread of its block writes, with no barrier between: in
+some orders of threads entries go astray, and with them those of tiles. None of 1,000 frames on an H200 showed it; here
+the barrier is there.
 """
 
 from enum import IntEnum

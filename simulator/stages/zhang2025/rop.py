@@ -3,7 +3,9 @@
 One thread a pixel, 16x16 a block. Each walks its pixel's list (the newest fragment first) and keeps the covered
 fragments, sorts them by primitive identifier (API order) or by depth (order-independent transparency), and tests and
 blends them. The original keeps four in shared memory and does not check for more; here the first four found are kept
-and the rest is reported, and 0 asks for no limit. Before optimization the four lay in local memory.
+and the rest is reported, and 0 asks for no limit. Before optimization the four lay in local memory. A list ends with
+number -1 here; in the original with 0, which is also the number of the frame's first fragment: it is never drawn
+(``zero_ends``).
 """
 
 from typing import Any, Literal, NamedTuple
@@ -75,6 +77,7 @@ def rop(
     fragment_depth: FragmentDepth = "direct",
     limit: int,
     optimized: bool,
+    zero_ends: bool = False,
 ) -> StageResult[Resolved]:
     """Resolve all pixels.
 
@@ -92,6 +95,8 @@ def rop(
         Fragments a pixel can keep; 0 for all.
     optimized : bool
         Shared memory; or the local memory of before.
+    zero_ends : bool
+        Number 0 ends a list, as in the original, which so loses fragment 0.
 
     Returns
     -------
@@ -101,6 +106,8 @@ def rop(
     height, width = fragments.depth.shape
     heads, links = np.full((height, width), -1, np.int64), np.full(4 * len(stream.entries), -1, np.int64)
     _link(stream.entries, stream.places, heads, links)
+    if zero_ends:
+        heads[heads == 0] = links[links == 0] = -1
     target, winners = np.zeros((height, width, 4), np.float32), np.full((height, width), -1, np.int32)
     depth = fragments.depth.astype(np.int64)
     columns, rows = -(-width // BLOCK_SIDE), -(-height // BLOCK_SIDE)

@@ -80,3 +80,12 @@ class Result:
     def predicted_errors(self) -> list[float]:
         """Absolute relative errors of the predicted cells: the only ones that are ever averaged."""
         return [abs(c.error) for c in self.cells if c.status == "predicted" and c.error is not None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one experiment: a result, or a sentence on why there is none."""
+
+    name: str
+    result: Result | None = None
+    failure: str = ""

@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 
-from tilestamp.experiments.silicon.sass import Block, Instruction, basic_blocks, target
+from tilestamp.experiments.calibration.sass import Block, Instruction, basic_blocks, target
 
 Sections = dict[str, list[Block]]
 

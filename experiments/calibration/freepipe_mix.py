@@ -1,6 +1,6 @@
 """The instruction mix of FreePipe on compute capability 9.0, written from its machine code and a few fitted numbers.
 
-    python -m tilestamp.experiments.silicon.freepipe_mix LISTING > simulator/mixes/freepipe/cc9.toml
+    python -m tilestamp.experiments.calibration.freepipe_mix LISTING > simulator/mixes/freepipe/cc9.toml
 
 LISTING is ``cuobjdump -sass`` of the two kernels of shared/silicon/src/freepipe.cu, as nvcc 13.0.88 compiles it for
 sm_90 with default flags. The inner loop is unrolled four times, behind a remainder of up to three pixels. The kernel
@@ -10,10 +10,10 @@ holds the scan twice, for triangles that need no clipping and for those that do;
 import sys
 from pathlib import Path
 
-from tilestamp.experiments.silicon import cudaraster_mix, sass
-from tilestamp.experiments.silicon.cudaraster_blocks import Events, Run
-from tilestamp.experiments.silicon.cudaraster_mix import Price
-from tilestamp.experiments.silicon.sass import Block
+from tilestamp.experiments.calibration import cudaraster_mix, sass
+from tilestamp.experiments.calibration.cudaraster_blocks import Events, Run
+from tilestamp.experiments.calibration.cudaraster_mix import Price
+from tilestamp.experiments.calibration.sass import Block
 
 REGISTERS = 58
 FUNCTIONS = {"freepipe": "_Z10k_freepipeILi0EEv6FPArgs", "freepipe_early": "_Z10k_freepipeILi1EEv6FPArgs"}
@@ -106,7 +106,7 @@ def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
 
 def main(listing: Path) -> str:
     """Both tables."""
-    source = "shared/silicon/src/freepipe.cu, nvcc 13.0.88, sm_90: experiments/silicon/freepipe_mix.py"
+    source = "shared/silicon/src/freepipe.cu, nvcc 13.0.88, sm_90: experiments/calibration/freepipe_mix.py"
     return "\n".join(
         cudaraster_mix.table(kernel, REGISTERS, source, prices(kernel, code_of(listing, kernel))) for kernel in RUNS
     )

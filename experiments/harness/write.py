@@ -1,30 +1,38 @@
 """Write a result: tidy CSV, a manifest, plots; one page over all results; and one table of all boundaries."""
 
 import json
-import platform
 import shutil
 import tempfile
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tilestamp.experiments.registry import describe_folder
-from tilestamp.experiments.result import Cell, Result
+import tilestamp
+from tilestamp.experiments.harness.registry import describe_folder
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.models.used import Used
 from tilestamp.reports.page import write_page
-from tilestamp.simulator.manifest import source_digest
+from tilestamp.simulator.manifest import software, source_digest, used_manifest
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PACKAGES = ("numpy", "numba", "pandas", "matplotlib", "trimesh")
 SCRATCH = ".partial-"  # first letters of a folder that is being written
 BOUNDARIES = "boundaries"  # a table of results of the stability atlas
 COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim")
 
 
-def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
+def write_result(result: Result, folder: Path, options: dict[str, Any], used: Used | None = None) -> Path:
     """Write one result into a folder of its own in ``folder``, all of it or nothing.
+
+    Parameters
+    ----------
+    result : Result
+    folder : Path
+    options : dict
+        As the user gave them; ``command`` is the command line.
+    used : dict, optional
+        What the experiment used (``tilestamp.models.used.collect``).
 
     Returns
     -------
@@ -45,7 +53,7 @@ def write_result(result: Result, folder: Path, options: dict[str, Any]) -> Path:
             table.to_csv(made / f"{name}.csv", index=False)
         for figure in result.figures:
             figure.draw(made / f"{figure.name}.png")
-        (made / "manifest.json").write_text(json.dumps(_manifest(result, options), indent=1) + "\n")
+        (made / "manifest.json").write_text(json.dumps(_manifest(result, options, used or {}), indent=1) + "\n")
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)
     return target
@@ -66,17 +74,15 @@ def _record(cell: Cell) -> dict[str, Any]:
     return {name: getattr(cell, name) for name in COLUMNS}
 
 
-def _manifest(result: Result, options: dict[str, Any]) -> dict[str, Any]:
-    """What made the result: versions, digest of the sources, options, warnings."""
+def _manifest(result: Result, options: dict[str, Any], used: Used) -> dict[str, Any]:
+    """What made the result: versions and sources, command, all machines, mixes, scenes and runs that it used."""
     return {
         "experiment": result.name,
         "source": result.source,
-        "tilestamp": version("tilestamp"),
-        "source_digest": source_digest(),
-        "python": platform.python_version(),
-        "packages": {name: version(name) for name in PACKAGES},
-        "options": options,
+        **software(options.get("command", "")),
+        "options": {name: value for name, value in options.items() if name != "command"},
         "warnings": result.warnings,
+        **used_manifest(used),
     }
 
 
@@ -87,7 +93,7 @@ def write_index(results: Sequence[Result], folder: Path) -> Path:
         "Published cells beside what tilestamp computes. A fitted cell had a parameter chosen on it, so its error says "
         "nothing and is never averaged; a predicted one had none. Red: outside the aim."
     )
-    footer = f"tilestamp {version('tilestamp')}, sources {source_digest()}"
+    footer = f"tilestamp {tilestamp.__version__}, sources {source_digest()}"
     sections = [_section(result) for result in results]
     for group, table in boundary_tables(results).items():
         table.to_csv(folder / f"{group}.csv", index=False)

@@ -1,18 +1,19 @@
 """Experiments by name: a module in a paper's folder that has a function ``run`` is one (``eisenacher2010/table1``).
 
-A module that says ``SLOW = True`` runs only when it is named, or when all are asked for.
+A module that says ``SLOW = True`` runs only when it is named, or when all are asked for. A folder whose experiments
+share frames says ``ONE_PROCESS = True``.
 """
 
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from tilestamp.experiments.result import Result
+from tilestamp.experiments.harness.result import Result
 from tilestamp.models.errors import TilestampError
 
 Progress = Callable[[str], None]
 Experiment = Callable[[Progress], Result]
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1]
 
 
 def experiment_names() -> list[str]:
@@ -37,6 +38,12 @@ def load_experiment(name: str) -> Experiment:
     """The function that runs the experiment ``name``."""
     experiment: Experiment = import_module(_module(name)).run
     return experiment
+
+
+def process_of(name: str) -> str:
+    """Experiments of one name here run in one process: those of a folder that says ``ONE_PROCESS = True``."""
+    folder = name.split("/", maxsplit=1)[0]
+    return folder if getattr(import_module(f"tilestamp.experiments.{folder}"), "ONE_PROCESS", False) else name
 
 
 def is_slow(name: str) -> bool:

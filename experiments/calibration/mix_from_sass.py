@@ -1,11 +1,11 @@
 """The instruction mix of the micropolygon back end on compute capability 9.0, written from its machine code.
 
-    python -m tilestamp.experiments.silicon.mix_from_sass LISTING
+    python -m tilestamp.experiments.calibration.mix_from_sass LISTING
 
 prints the tables of the address calculation, the bucket write and the tile raster of ``simulator/mixes/micropolygon/
 cc9.toml``. Everything in them is read from the code: instructions by class and section, and by the compiler's schedule
 the cycles that a lone warp needs for each section. Two latencies of that schedule are not in the micro-benchmarks and
-are fitted to the times of one scene, teapot_512x512_bb4 (``tilestamp.experiments.silicon.sass``: S2UR, BRANCH).
+are fitted to the times of one scene, teapot_512x512_bb4 (``tilestamp.experiments.calibration.sass``: S2UR, BRANCH).
 """
 
 import sys
@@ -13,8 +13,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from tilestamp.experiments.silicon.raster_sections import Sections, raster_sections
-from tilestamp.experiments.silicon.sass import (
+from tilestamp.experiments.calibration.raster_sections import Sections, raster_sections
+from tilestamp.experiments.calibration.sass import (
     LATENCY,
     Block,
     Instruction,

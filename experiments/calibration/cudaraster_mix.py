@@ -1,6 +1,6 @@
 """The instruction mix of CudaRaster on compute capability 9.0, written from its machine code and a few fitted numbers.
 
-    python -m tilestamp.experiments.silicon.cudaraster_mix LISTING > simulator/mixes/cudaraster/cc9.toml
+    python -m tilestamp.experiments.calibration.cudaraster_mix LISTING > simulator/mixes/cudaraster/cc9.toml
 
 LISTING is what ``cuobjdump -sass`` prints (see ``cudaraster_blocks``). Instructions of each event by class, and by the
 compiler's schedule the cycles that a lone warp needs for them, are read from the code. ``FITTED`` holds what the blocks
@@ -12,9 +12,9 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from tilestamp.experiments.silicon import sass
-from tilestamp.experiments.silicon.cudaraster_blocks import CHAINS, LANES, PASSED, REGISTERS, RUNS, Events, Run
-from tilestamp.experiments.silicon.sass import Block
+from tilestamp.experiments.calibration import sass
+from tilestamp.experiments.calibration.cudaraster_blocks import CHAINS, LANES, PASSED, REGISTERS, RUNS, Events, Run
+from tilestamp.experiments.calibration.sass import Block
 
 ALU_CYCLES = 4.11  # of one step of chain_alu: the machine file's latency.alu_cycles
 BARRIER_CYCLES = 24.0  # a barrier of 16 warps takes longer than the machine file's, of 4 (microbenchmarks.csv)
@@ -165,7 +165,7 @@ def table(kernel: str, registers: int, source: str, found: dict[str, Price]) -> 
 
 def main(listing: Path) -> str:
     """All tables."""
-    source = "RasterImpl.cu of nvdiffrast, nvcc 13.0.88, sm_90: experiments/silicon/cudaraster_blocks.py"
+    source = "RasterImpl.cu of nvdiffrast, nvcc 13.0.88, sm_90: experiments/calibration/cudaraster_blocks.py"
     found = {kernel: prices(kernel, code_of(listing, kernel)) for kernel in RUNS}
     out = [table(kernel, REGISTERS[kernel], source, found[kernel]) for kernel in RUNS]
     for kernel, registers in (("triangleSetup", 70), ("binRaster", 67)):

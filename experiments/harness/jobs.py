@@ -1,0 +1,136 @@
+"""Experiments side by side, in processes of joblib's.
+
+Compiling kernels holds one core, so that two processes make the first run on two cores almost twice as fast.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import traceback
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from itertools import chain, groupby
+from multiprocessing import resource_tracker
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Thread
+from typing import Any
+
+from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
+from tilestamp.experiments.harness.result import Outcome, Result
+from tilestamp.experiments.harness.write import SCRATCH, write_result
+from tilestamp.models.errors import MissingInputError, TilestampError
+from tilestamp.models.used import collect
+
+LONGEST = 4096  # bytes of one line of progress
+
+
+def default_jobs() -> int:
+    """Processes by default: one a core, two at most, for each holds its own frames."""
+    return min(2, os.cpu_count() or 1)
+
+
+def run_experiments(
+    names: Sequence[str], output: Path, options: dict[str, Any], say: Progress, jobs: int
+) -> Iterator[Outcome]:
+    """Run experiments and write their results.
+
+    Parameters
+    ----------
+    names : sequence of str
+    output : Path
+        Folder for the results.
+    options : dict
+        For the manifests.
+    say : callable
+        Told what is being done; from another thread where there are several processes.
+    jobs : int
+        Processes; 1 runs everything in this one.
+
+    Yields
+    ------
+    Outcome
+        As they come; results without their figures' functions, for all is drawn.
+    """
+    from joblib import Parallel, delayed
+    from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    groups = [list(group) for _, group in groupby(names, key=(lambda name: name) if jobs == 1 else process_of)]
+    left = dict.fromkeys(names)
+    try:
+        with _listener(say) as address:
+            told = say if jobs == 1 else partial(_send, address)
+            tasks = [delayed(_run_all)(group, output, options, told) for group in groups]
+            resource_tracker.ensure_running()  # or joblib starts it in what follows, and it lets signals through
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers do not hear Ctrl-C: we end them
+            try:
+                finished = Parallel(jobs, return_as="generator_unordered")(tasks)
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            for outcome in chain.from_iterable(finished):
+                del left[outcome.name]
+                yield outcome
+    except TerminatedWorkerError:
+        sentence = "a process that ran experiments ended before its time: out of memory? try -j 1"
+        yield from (Outcome(name, failure=sentence) for name in left)
+    finally:
+        get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+        for scratch in output.glob(f"{SCRATCH}*"):
+            shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], say: Progress) -> list[Outcome]:
+    """Run some experiments one after another, perhaps in a process of their own."""
+    return [_run(name, output, options, say) for name in names]
+
+
+def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Outcome:
+    """Run one experiment; what it lacks is said in its place."""
+    try:
+        say(name)
+        try:
+            with collect() as used:
+                result = load_experiment(name)(say)
+        except MissingInputError as missing:
+            result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
+        write_result(result, output, options, used)
+    except TilestampError as error:
+        return Outcome(name, failure=str(error))
+    except Exception as error:  # noqa: BLE001 - one experiment's fault ends no other
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return Outcome(name, failure=f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+    return Outcome(name, replace(result, figures=[replace(figure, draw=_drawn) for figure in result.figures]))
+
+
+def _drawn(_path: Path) -> None:
+    """Stand for a figure that has been drawn."""
+
+
+@contextmanager
+def _listener(say: Progress) -> Iterator[str]:
+    """Pass on what workers send to an address."""
+    with TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        address = f"{folder}/progress"
+        receiver.bind(address)
+        lines = map(bytes.decode, iter(partial(receiver.recv, LONGEST), b""))
+        thread = Thread(target=deque, args=(map(say, lines), 0), daemon=True)  # a deque without room: says them all
+        thread.start()
+        try:
+            yield address
+        finally:
+            _send(address, "")
+            thread.join()
+
+
+def _send(address: str, text: str) -> None:
+    """Say what is being done; where nobody listens any more, the parent is gone, and so are we."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.sendto(text.encode()[:LONGEST], address)
+    except OSError:
+        os._exit(1)
