@@ -49,12 +49,12 @@ TWO = _clip_space((-1, -1, 0, 1), (1, -1, 0, 1), (1, 1, 0, 1), (-1, -1, 0, 1), (
 
 @pytest.mark.parametrize(("mesh", "quads"), [(OVERSIZED, 32 * 32), (TWO, 32 * 32 + 32)])
 def test_a_triangle_that_leaves_the_screen_stays_whole(mesh, quads):
-    frame, work, _ = hardware(*mesh, 64, 64)
+    frame, (work,), _ = hardware(*mesh, 64, 64)
     assert (work.items["quads"], np.count_nonzero(frame.ids < 0)) == (quads, 0)
 
 
 def test_without_the_guard_band_both_pieces_count_the_quads_of_their_seam():
-    _, work, _ = hardware(*OVERSIZED, 64, 64, guard_band=False)
+    _, (work,), _ = hardware(*OVERSIZED, 64, 64, guard_band=False)
     assert work.items["quads"] == 32 * 32 + 32
 
 

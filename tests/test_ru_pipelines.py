@@ -87,7 +87,7 @@ def test_with_samples_at_corners_lists_and_pixels_are_the_originals_on_a_gpu(sha
     given, gpu = (np.load(shared / f"silicon/textured/{part}/ru_{name}.npz") for part in ("inputs", "measured/ids"))
     corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
     made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
-    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}))
+    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}), Executor())
     assert (frame.maps["list length"][::-1].ravel() == gpu["t8c_cnt"].ravel()).all()
     assert np.count_nonzero(frame.triangle_ids[::-1].ravel() != gpu["t8c_id"].ravel()) <= 1  # equal depths
 
@@ -279,7 +279,7 @@ def test_occlusion_only_darkens(scene, matrix):
 
 
 def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
-    blurred, work = occlusion_blur(rng_light, SIMT)
+    blurred, (work,), _ = occlusion_blur(rng_light, SIMT)
     for y, x in [(0, 0), (1, 30), (20, 20), (HEIGHT - 1, WIDTH - 1)]:
         window = rng_light[max(y - 2, 0) : y + 2, max(x - 2, 0) : x + 2]
         assert blurred[y, x] == pytest.approx(window.mean(), rel=1e-6)
@@ -288,7 +288,7 @@ def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
 
 def test_the_blur_loads_and_stores_as_often_as_an_h200_counts():
     """Measured on the original at 800x800: a sector for each thread that loads, and for each that stores."""
-    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt())[1].counts()
+    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt()).works[0].counts()
     assert counts["STORE_TRANSACTIONS"] == 640_000
     assert counts["LOAD_TRANSACTIONS"] == pytest.approx(1_429_963, rel=0.01)
     assert (counts["WARPS"], counts["BLUR_WARPS"]) == (50_000, 40_000)

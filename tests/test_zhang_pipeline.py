@@ -153,7 +153,8 @@ def test_at_1080_the_top_24_rows_stay_empty_as_on_a_gpu(shared):
     name = "zh_bunny_5k_near.npz"
     given, gpu = (np.load(shared / f"silicon/textured/{part}/{name}") for part in ("inputs", "measured/ids"))
     made = Scene("bunny", mesh=Mesh(given["positions"], given["triangles"].astype(np.int32)))
-    ids = binned(made, given["matrix"], 1920, 1080, SIMT, BinnedOptions(original_faults=True)).triangle_ids[::-1]
+    options = BinnedOptions(original_faults=True)
+    ids = binned(made, given["matrix"], 1920, 1080, SIMT, options, Executor()).triangle_ids[::-1]
     assert np.flatnonzero((gpu["id"] >= 0).any(axis=1)).max() == 1055
     assert ((ids >= 0) != (gpu["id"] >= 0)).sum() < 20  # float32 edges: 15 of 612,751
 
