@@ -99,7 +99,9 @@ def test_per_primitive_tests_as_many_pixels_as_the_original_does(shared, name):
     corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
     made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
     options = pipeline_options("per-primitive", {"samples": "corners"})
-    counts = work(per_primitive(made, given["matrix"], 800, 800, SIMT, options), "per_primitive_raster").counts()
+    counts = work(
+        per_primitive(made, given["matrix"], 800, 800, SIMT, options, Executor()), "per_primitive_raster"
+    ).counts()
     counted = (shared / f"silicon/textured/source_on_cpu/ru_{name}.csv").read_text().splitlines()
     for event in ("sample_tests", "sample_hits"):
         assert f"per_primitive_cull,_rasterize,{event},{counts[event.upper()]}" in counted

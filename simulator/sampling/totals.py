@@ -177,8 +177,8 @@ def _smoothed(sample: Sample, fit: _Fit) -> Floats:
 def expanded(sample: Sample) -> Integers:
     """Rows of all units, (units, events): as executed, or what is foretold of them and a miss of those that ran.
 
-    Misses go round the units that ran in the same stratum, so that units are as unlike as those; totals are the
-    estimates.
+    It is the miss of a neighbour in launch order, of the same stratum, so that units are as unlike, and neighbours as
+    alike, as those that ran; totals are the estimates.
     """
     strata, taken = sample.strata, sample.taken
     table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
@@ -206,16 +206,26 @@ def left(sample: Sample) -> Integers:
 
 
 def _donors(sample: Sample, random: np.random.Generator | None = None) -> Integers:
-    """For each unit of ``left`` the row of one that ran in its stratum: in turn, or drawn from a bootstrap sample."""
+    """For each unit of ``left`` the row of one that ran in its stratum: the nearest, or one of a bootstrap sample."""
     taken, rest = sample.taken, sample.strata.units - sample.taken
     first = np.cumsum(taken) - taken
     many, start = np.repeat(taken, rest), np.repeat(first, rest)
     if random is None:
-        turn = np.arange(rest.sum()) - np.repeat(np.cumsum(rest) - rest, rest)
-        in_turn: Integers = start + turn % many
-        return in_turn
+        return _nearest(sample)
     again = np.repeat(first, taken) + (random.random(taken.sum()) * np.repeat(taken, taken)).astype(np.int64)
     donors: Integers = again[start + (random.random(len(many)) * many).astype(np.int64)]
+    return donors
+
+
+def _nearest(sample: Sample) -> Integers:
+    """For each unit of ``left`` the row of the last before it in launch order that ran in its stratum, or the first."""
+    strata, rows = sample.strata, np.cumsum(sample.taken) - sample.taken
+    found = []
+    for first, end, taken, row in zip(strata.first[:-1], strata.first[1:], sample.taken, rows, strict=True):
+        ran, rest = strata.order[first : first + taken], strata.order[first + taken : end]
+        ascending = np.argsort(ran)
+        found.append(row + ascending[np.searchsorted(ran[ascending], rest).clip(1, taken) - 1] if len(rest) else rest)
+    donors: Integers = np.concatenate(found)
     return donors
 
 
