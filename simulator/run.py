@@ -22,7 +22,7 @@ from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest,
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
-from tilestamp.simulator.sampling.totals import left
+from tilestamp.simulator.sampling.expansion import left
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 

@@ -7,8 +7,9 @@ from tests.benchmarks.interval_coverage import coverage
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.sampling.estimate import t_quantile
+from tilestamp.simulator.sampling.expansion import expanded
 from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
-from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
+from tilestamp.simulator.sampling.totals import enlarged, totals
 
 SEEDS = 200
 ERROR = 0.02

@@ -15,8 +15,9 @@ from tilestamp.models.traffic import Traffic
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling.estimate import Floats, Integers
+from tilestamp.simulator.sampling.expansion import expanded
 from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
-from tilestamp.simulator.sampling.totals import enlarged, expanded, totals
+from tilestamp.simulator.sampling.totals import enlarged, totals
 from tilestamp.simulator.stage import Divisible, StageResult
 from tilestamp.simulator.work import Work
 

@@ -8,7 +8,8 @@ from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
 from tilestamp.models.timing import Timing
 from tilestamp.simulator.sampling.estimate import Estimate, Floats, t_quantile
-from tilestamp.simulator.sampling.totals import replicas, totals
+from tilestamp.simulator.sampling.expansion import replicas
+from tilestamp.simulator.sampling.totals import totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 LEAST = 5e-4  # of a time: no half-width below it is claimed, for single units beside the longest weigh more than others

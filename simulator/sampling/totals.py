@@ -10,7 +10,6 @@ stratum by stratum, the mean of what it misses (the regression estimator: Cochra
 Everything here is a pure function of sizes, rows and a seed.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.simulator.sampling.estimate import Floats, Integers, Totals, t_quantile
-from tilestamp.simulator.sampling.strata import Sample, drawn, places
+from tilestamp.simulator.sampling.strata import Sample, places
 
 ENOUGH = 16  # units that ran for each thing known, before rows are predicted by them
 FEWEST_KNOWN = 2  # things: 1, and the size
@@ -31,7 +30,7 @@ MOSTLY = 0.9  # of them
 
 
 @dataclass(frozen=True)
-class _Fit:
+class Fit:
     """What rows are predicted to be, and how far they are from it."""
 
     factors: Floats  # (p, k): rows are predicted as what is known times these
@@ -43,18 +42,19 @@ class _Fit:
     taken: Integers
 
 
-def _fit(sample: Sample, values: Floats) -> _Fit:
+def fit_rows(sample: Sample, values: Floats) -> Fit:
+    """Fit what is known to the values of the units that ran, (units, k); stratum by stratum what that misses."""
     strata, taken = sample.strata, sample.taken
     known = strata.ordered[places(strata, taken)]
     factors, leverage = _factors(sample, known, values)
-    residual = values - _product(known, factors)
+    residual = values - product(known, factors)
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
     some = np.maximum(taken, 1)[:, None]
     mean = _reduce(residual, starts, taken) / some
     apart = (residual - np.repeat(mean, taken, axis=0)) / (1 - leverage)[:, None]
     spread = _reduce(apart**2, starts, taken) / np.maximum(taken - 1, 1)[:, None]
     weight = strata.units * (strata.units - taken) / some[:, 0]
-    return _Fit(factors, residual, apart, mean, spread, weight, taken)
+    return Fit(factors, residual, apart, mean, spread, weight, taken)
 
 
 def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -67,13 +67,13 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Flo
     weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
     some = known[first:, :used]
     weighted = (some * weight[:, None]).T
-    inverse = np.linalg.pinv(_product(weighted, some), hermitian=True)
-    factors[: some.shape[1]] = _product(inverse, _product(weighted, values[first:]))
-    leverage[first:] = np.minimum((_product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
+    inverse = np.linalg.pinv(product(weighted, some), hermitian=True)
+    factors[: some.shape[1]] = product(inverse, product(weighted, values[first:]))
+    leverage[first:] = np.minimum((product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
     return factors, leverage
 
 
-def _product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
+def product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
     """Multiply matrices on this thread: those of a linear algebra library spin long after such small products."""
     if a.shape[0] < a.shape[1]:  # few rows
         return np.stack([(row[:, None] * b).sum(axis=0) for row in a])
@@ -104,7 +104,7 @@ def totals(sample: Sample, values: Floats) -> Totals:
     if sample.complete:
         none = np.zeros(values.shape[1])
         return Totals(values.sum(axis=0), none, none + np.inf)
-    fit = _fit(sample, values)
+    fit = fit_rows(sample, values)
     units, first = sample.strata.units, int(sample.taken[0])
     rest = sample.strata.ordered[first:].sum(axis=0) @ fit.factors + (units[1:, None] * fit.mean[1:]).sum(axis=0)
     value = values[:first].sum(axis=0) + rest
@@ -116,7 +116,7 @@ def totals(sample: Sample, values: Floats) -> Totals:
     return Totals(value, variance + unseen, np.minimum(freedom, few))
 
 
-def _rare(sample: Sample, values: Floats, fit: _Fit) -> tuple[Floats, Floats]:
+def _rare(sample: Sample, values: Floats, fit: Fit) -> tuple[Floats, Floats]:
     """Account for deviations that few units have: variance by those not seen, and degrees of freedom by those seen.
 
     Where nearly all units that ran are alike, one more is taken to deviate by ``RARE`` of what it does. Where few units
@@ -144,7 +144,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
     Every column of ``values`` is asked to reach the error. Units are spread by Neyman's rule: where there are many, and
     where they differ.
     """
-    fit, found = _fit(sample, values), totals(sample, values)
+    fit, found = fit_rows(sample, values), totals(sample, values)
     N, n = sample.strata.units, sample.taken
     relative = np.where(found.value != 0, 1 / np.where(found.value != 0, found.value, 1.0), 0.0)
     unlike = np.sqrt(_smoothed(sample, fit) * relative**2)  # by stratum and quantity
@@ -161,7 +161,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
     return np.where(more > 0.8 * N, N, more).astype(np.int64)
 
 
-def _smoothed(sample: Sample, fit: _Fit) -> Floats:
+def _smoothed(sample: Sample, fit: Fit) -> Floats:
     """Residual variances, small samples' drawn towards what is usual: in proportion to size, or not, if less."""
     strata = sample.strata
     size = strata.sizes
@@ -172,77 +172,3 @@ def _smoothed(sample: Sample, fit: _Fit) -> Floats:
     prior = np.where(size > 0, PRIOR, 0.0)[:, None]  # units without size are alike
     smoothed: Floats = (freedom * fit.spread + prior * usual) / np.maximum(freedom + prior, 1)
     return smoothed
-
-
-def expanded(sample: Sample) -> Integers:
-    """Rows of all units, (units, events): as executed, or what is foretold of them and a miss of those that ran.
-
-    It is the miss of a neighbour in launch order, of the same stratum, so that units are as unlike, and neighbours as
-    alike, as those that ran; totals are the estimates.
-    """
-    strata, taken = sample.strata, sample.taken
-    table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
-    table[drawn(strata, taken)] = sample.rows
-    if not sample.complete:
-        values, rest = sample.rows.astype(np.float64), left(sample)
-        fit = _fit(sample, values)
-        rows = _product(strata.known[rest], fit.factors) + fit.residual[_donors(sample)]
-        np.maximum(rows, 0.0, out=rows)
-        sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
-        rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
-        ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
-        table[rest] = np.diff(ends, axis=0, prepend=0)
-    for event, column in sample.exact.items():
-        table[:, event] = column
-    return table
-
-
-def left(sample: Sample) -> Integers:
-    """Units that did not run, stratum after stratum."""
-    ran = np.zeros(len(sample.strata.order), np.bool_)
-    ran[places(sample.strata, sample.taken)] = True
-    units: Integers = sample.strata.order[~ran]
-    return units
-
-
-def _donors(sample: Sample, random: np.random.Generator | None = None) -> Integers:
-    """For each unit of ``left`` the row of one that ran in its stratum: the nearest, or one of a bootstrap sample."""
-    taken, rest = sample.taken, sample.strata.units - sample.taken
-    first = np.cumsum(taken) - taken
-    many, start = np.repeat(taken, rest), np.repeat(first, rest)
-    if random is None:
-        return _nearest(sample)
-    again = np.repeat(first, taken) + (random.random(taken.sum()) * np.repeat(taken, taken)).astype(np.int64)
-    donors: Integers = again[start + (random.random(len(many)) * many).astype(np.int64)]
-    return donors
-
-
-def _nearest(sample: Sample) -> Integers:
-    """For each unit of ``left`` the row of the last before it in launch order that ran in its stratum, or the first."""
-    strata, rows = sample.strata, np.cumsum(sample.taken) - sample.taken
-    found = []
-    for first, end, taken, row in zip(strata.first[:-1], strata.first[1:], sample.taken, rows, strict=True):
-        ran, rest = strata.order[first : first + taken], strata.order[first + taken : end]
-        ascending = np.argsort(ran)
-        found.append(row + ascending[np.searchsorted(ran[ascending], rest).clip(1, taken) - 1] if len(rest) else rest)
-    donors: Integers = np.concatenate(found)
-    return donors
-
-
-def replicas(sample: Sample, values: Floats, count: int) -> Iterator[Floats]:
-    """Changes that make the values of the units of ``left`` those of other samples like this one, (units left, k) each.
-
-    A bootstrap within strata, and for each unit left the miss of one unit of it at random: totals then vary as those
-    of samples do, and single units as units do.
-
-    Parameters
-    ----------
-    sample : Sample
-    values : ndarray, (units that ran, k), float64
-    count : int
-    """
-    fit, plain = _fit(sample, values), _donors(sample)
-    few = np.repeat(np.sqrt(sample.taken / np.maximum(sample.taken - 1, 1)), sample.taken)[:, None]
-    wide = np.repeat(fit.mean, sample.taken, axis=0) + fit.apart * few
-    for replica in range(count):
-        yield wide[_donors(sample, np.random.default_rng(replica))] - fit.residual[plain]

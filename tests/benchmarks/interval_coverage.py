@@ -105,7 +105,8 @@ def main(scenes: list[str]) -> None:
             for machine in MACHINES:
                 try:
                     c = coverage(pipeline, machine, scene)
-                except TilestampError:  # triangles alone, or a machine that the original did not run on
+                except TilestampError as refused:  # triangles alone, or a machine that the original cannot use
+                    sys.stdout.write(f"{scene:14} {pipeline:13} {machine:7} {refused}\n")
                     continue
                 sys.stdout.write(
                     f"{scene:14} {pipeline:13} {machine:7} time {c.time:4.0%} (width {c.width:.2%})  counts "
