@@ -60,7 +60,7 @@ def _triangle_ids(
     )
     bins, _, _ = bin_raster(setup, width, height, simt, release="nvdiffrast", counting=False)
     tiles, _, _ = coarse_raster(bins, setup, width, height, simt, release="nvdiffrast", counting=False)
-    buffers, _ = fine_raster(
+    buffers, _, _ = fine_raster(
         setup, tiles.starts, tiles.entries, tiles.active, width, height, simt, release="nvdiffrast", counting=False
     )
     return buffers.ids[0, :height, :width]

@@ -1,24 +1,28 @@
 """A run: the picture, what each stage did, how long it would take, and how sure each number is."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bounds import bounds
 from tilestamp.models.counters import Counter
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
+from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
-from tilestamp.simulator import intervals
-from tilestamp.simulator.estimate import Estimate
+from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.sampling import intervals
+from tilestamp.simulator.sampling.estimate import Estimate, Floats
+from tilestamp.simulator.sampling.expansion import left
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
@@ -43,6 +47,8 @@ class Run:
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
     """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
+    counted: bool = True
+    """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
 
     origin: Origin | None = None
 
@@ -50,11 +56,6 @@ class Run:
         """Note it for the manifest of whoever collects."""
         settings = (self.width, self.height, self.fidelity, self.error, self.options)
         note_run(self.scene, self.origin, self.pipeline, self.machine, settings)
-
-    @property
-    def counted(self) -> bool:
-        """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
-        return bool(self.options.get("counting", True))
 
     def _check_counted(self) -> None:
         if not self.counted:
@@ -143,18 +144,18 @@ class Run:
     @cached_property
     def launch_intervals(self) -> list[dict[str, Estimate]]:
         """The numbers of ``intervals`` of each launch, in launch order."""
-        launches = zip(self.frame.works, self.launches, self.timings, strict=True)
-        return [self._intervals(work, launch, timing) for work, launch, timing in launches]
+        return [self._intervals(index) for index in range(len(self.launches))]
 
-    def _intervals(self, work: Any, launch: Any, timing: Timing) -> dict[str, Estimate]:
+    def _intervals(self, index: int) -> dict[str, Estimate]:
         """Of one launch."""
+        work, launch, timing = self.frame.works[index], self.launches[index], self.timings[index]
         counts = intervals.count_intervals(work)
         known = {name: intervals.exactly(0) for name, counter in self.counters.items() if counter.kind == "count"}
         known |= {counter.name: counts[counter.event] for counter in work.counters if counter.kind == "count"}
-        if isinstance(work, Work):
+        if isinstance(work, Work) and isinstance(launch, Launch):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)
-            known["milliseconds"] = intervals.milliseconds(timing, work, ran, self.machine)
+            known["milliseconds"] = intervals.milliseconds(timing, work, partial(self._changed, index))
         else:
             known["milliseconds"] = intervals.exactly(timing.milliseconds)
         return known
@@ -163,7 +164,27 @@ class Run:
         """Price the units that ran, where not all did."""
         if work.sample is None or work.sample.complete:
             return None
-        return self._launch(replace(work, table=work.sample.rows, streams=(), atomic_requests=None))
+        return self._launch(replace(work, table=work.sample.sampled, streams=(), atomic_requests=None))
+
+    def _changed(self, index: int, change: Floats) -> float:
+        """Milliseconds of the ``index``-th launch, were the rows of its units that did not run others."""
+        work, launch, moved = self.frame.works[index], self.launches[index], self._traffic[index]
+        assert isinstance(work, Work) and isinstance(launch, Launch) and work.sample is not None  # noqa: S101, PT018
+        events, rest = launch.events.copy(), left(work.sample)
+        priced = self._launch(replace(work, table=change, streams=()))  # type: ignore[arg-type]  # events are linear
+        events[rest] = np.maximum(events[rest] + priced.events, 0.0)
+        launch = replace(launch, events=events)
+        if work.sample.streams is not None:
+            launch = replace(launch, streams=work.sample.streams(change.sum(axis=0)))
+            launches = [*self.launches[:index], launch, *self.launches[index + 1 :]]
+            moved = traffic(launches, self.machine)[index]
+        level = schedule if self.timings[index].fidelity == "schedule" else bounds
+        return level(launch, self.machine, moved).milliseconds
+
+    @cached_property
+    def _traffic(self) -> list[Traffic]:
+        """Bytes of each launch."""
+        return traffic(self.launches, self.machine)
 
     @cached_property
     def counts_interval(self) -> dict[str, Estimate]:

@@ -1,23 +1,22 @@
 """Execute a pipeline, price what it did: scene x pipeline x machine -> run."""
 
 import os
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from msgspec import Meta
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.launchable import check_launches
 from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import Options, plain
-from tilestamp.simulator.pipelines import can_take, load_pipeline, pipeline_options
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.sampling.completed import completed
+from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.scenes.camera import clip_matrix
 
@@ -35,6 +34,7 @@ def simulate(
     fidelity: Fidelity = "schedule",
     error: float = 0.0,
     seed: int = 0,
+    counting: bool = True,
     picture: bool = True,
     **options: Any,
 ) -> Run:
@@ -63,6 +63,8 @@ def simulate(
         of their value. Frames too small to pay for a sample run in full, and so do stages whose tail decides.
     seed : int
         Of the random part.
+    counting : bool
+        Count what the machine does; without it there is a picture, and nothing to price.
     picture : bool
         Whether one is wanted; without it what only makes the picture is skipped.
     **options
@@ -81,50 +83,22 @@ def simulate(
     width, height, error = drawing.width, drawing.height, drawing.error
     chosen = pipeline_options(pipeline, options)
     scene, machine = load_scene(scene), load_machine(machine)
-    if drawing.fidelity != "counts" and getattr(chosen, "counting", True):
+    if drawing.fidelity != "counts" and counting:
         check_launches(pipeline, chosen, machine)
     matrix = clip_matrix(read_camera(camera, scene), width, height)
-    origin = origin_of(scene, matrix, drawing.seed)
-    run = partial(Run, scene.name, pipeline, machine, width, height, drawing.fidelity, plain(chosen), origin=origin)
-    draw = partial(load_pipeline(pipeline), scene, matrix, width, height, machine.simt, chosen)
-    note = scene.note
-    without_picture = {"picture": False} if can_take(pipeline, "picture") else {}
-    if error and can_take(pipeline, "sample"):
-        sampler = Sampler(error, drawing.seed, pipeline, machine)
-        frame = draw(sample=sampler, **without_picture)
-        if sampler.executed:
-            facts = {"units": sampler.executed, "seconds_saved": sampler.seconds_saved}
-            return _escalated(run(frame, note, error, facts), sampler)
-        return run(frame, _joined(note, "everything ran: a sample would cost more"), error)
-    if error:
-        note = _joined(note, f"everything ran: {pipeline} cannot be sampled")
-    return run(draw(**{} if drawing.picture else without_picture), note, error)
-
-
-def _joined(*notes: str) -> str:
-    return "; ".join(filter(None, notes))
-
-
-def _escalated(run: Run, sampler: Sampler) -> Run:
-    """Run all units of the launches, the least sure first, whose samples do not tell the frame's time within the error.
-
-    A stage whose tail decides is one: which unit meets which, only all units say.
-    """
-    if run.fidelity == "counts" or run.milliseconds_interval.relative <= run.error:
-        return run
-    half = np.array([found["milliseconds"].half_width for found in run.launch_intervals])
-    order = np.argsort(-half)
-    left = np.cumsum(half[order][::-1] ** 2)[::-1]  # of the variance, before each is escalated
-    chosen = order[(left > (run.error * run.milliseconds) ** 2) & (half[order] > 0)]
-    works = list(run.frame.works)
-    for index in chosen:
-        works[index] = sampler.finished(works[index])
-    kernels = dict.fromkeys(works[index].kernel for index in sorted(chosen))
-    note = _joined(
-        run.note, f"all units ran of {', '.join(kernels)}: its tail decides, or part of it did not tell enough"
+    sampled = error and counting
+    execute = (
+        SampledExecutor(error, drawing.seed, pipeline, machine)
+        if sampled
+        else Executor(counting=counting, picture=drawing.picture)
     )
-    facts = run.sampled | {"seconds_saved": sampler.seconds_saved}
-    return replace(run, frame=replace(run.frame, works=works), note=note, sampled=facts)
+    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, chosen, execute)
+    origin, asked = origin_of(scene, matrix, drawing.seed), plain(chosen)
+    run = Run(
+        scene.name, pipeline, machine, width, height, drawing.fidelity, asked, frame, scene.note, error,
+        counted=counting, origin=origin,
+    )  # fmt: skip
+    return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 
 class Drawing(Options, frozen=True, kw_only=True):

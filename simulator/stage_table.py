@@ -10,7 +10,7 @@ from tilestamp.models.counters import Counter, by_name, counters_of
 from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.estimate import Estimate
+from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:

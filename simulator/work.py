@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
-from tilestamp.simulator.strata import Sample
+from tilestamp.simulator.sampling.strata import Sample
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,6 @@ def diced(shared: Path, name: str) -> tuple[Grids, dict[str, Any]]:
     patches = load_scene(camera["model"]).patches
     assert patches is not None
     view = (camera["model_to_clip"], camera["width"], camera["height"])
-    subpatches, _ = bound_and_split(patches.points, *view, camera["bound_pixels"], Simt(), counting=False)
-    grids, _ = dice(patches.points, subpatches, *view, Simt(), counting=False)
+    subpatches, _, _ = bound_and_split(patches.points, *view, camera["bound_pixels"], Simt(), counting=False)
+    grids, _, _ = dice(patches.points, subpatches, *view, Simt(), counting=False)
     return grids, camera

@@ -19,7 +19,7 @@ from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
 def draw(polygons, packing, spp=1):
     samples = new_samples(WIDTH, HEIGHT, sample_positions(spp))
-    return samples, across_polygons(polygons, samples, packing, GT200)
+    return samples, across_polygons(polygons, samples, packing, GT200).works[0]
 
 
 def box_samples(polygons):

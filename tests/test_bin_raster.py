@@ -52,7 +52,7 @@ def test_queues_hold_what_the_naive_version_holds_in_its_order(size):
 
 def test_clipped_triangles_that_overflow_the_ring_are_read_again():
     setup = small(several=0.9)
-    queues, work, facts = bin_raster(setup, 700, 400, Simt())
+    queues, (work,), facts = bin_raster(setup, 700, 400, Simt())
     overflows = rounds_of(setup)[1]
     assert overflows > 0
     assert facts["counters"]["BinRaster / Input overflows"] == (overflows, 0)
@@ -62,7 +62,7 @@ def test_clipped_triangles_that_overflow_the_ring_are_read_again():
 
 def test_every_batch_takes_a_round_even_when_nothing_is_visible():
     setup = small()._replace(subtriangles=np.zeros(1300, np.uint8))
-    queues, work, _ = bin_raster(setup, 700, 400, Simt())
+    queues, (work,), _ = bin_raster(setup, 700, 400, Simt())
     assert (work.total(E.ROUNDS), work.total(E.BATCHES), len(queues.entries)) == (3, 3, 0)
 
 
@@ -78,19 +78,19 @@ def test_results_do_not_depend_on_the_number_of_threads():
     for threads in (1, numba.get_num_threads()):
         before = numba.get_num_threads()
         numba.set_num_threads(threads)
-        tables.append(bin_raster(setup, 700, 400, Simt())[1].table)
+        tables.append(bin_raster(setup, 700, 400, Simt()).works[0].table)
         numba.set_num_threads(before)
     assert np.array_equal(*tables)
 
 
 def test_segments_are_closed_at_the_end_of_each_batch():
     setup = small()
-    queues, work, facts = bin_raster(setup, 700, 400, Simt())
+    queues, (work,), facts = bin_raster(setup, 700, 400, Simt())
     assert work.total(E.SEGMENTS) == facts["num_bin_segments"] == -(-queues.batch_counts // 512).sum()
 
 
 def test_each_block_draws_once_past_the_end():
-    _, work, _ = bin_raster(small(), 700, 400, Simt())
+    _, (work,), _ = bin_raster(small(), 700, 400, Simt())
     assert work.total(E.ATOMIC) == work.total(E.BATCHES) + 16 + work.total(E.ALLOC_ROUNDS)
 
 
@@ -137,14 +137,14 @@ def test_bins_hold_as_many_entries_as_on_the_gpu(shared, name, width):
 
 @pytest.mark.parametrize(("name", "width"), SCENES)
 def test_global_atomics_are_those_of_the_gpu(shared, name, width):
-    _, work, _ = bin_raster(*gpu_input(shared, name, width, "nvdiffrast"), Simt())
+    _, (work,), _ = bin_raster(*gpu_input(shared, name, width, "nvdiffrast"), Simt())
     counters = measured(shared, name, width, "binRaster")
     assert work.total(E.ATOMIC) == counters["ncu_cold", "l1tex__t_requests_pipe_lsu_mem_global_op_atom.sum"]
 
 
 @pytest.mark.parametrize("name", ["bunny", "soup2k"])
 def test_shared_atomics_are_those_of_the_gpu(shared, name):
-    _, work, _ = bin_raster(*gpu_input(shared, name, 1024, "nvdiffrast"), Simt())
+    _, (work,), _ = bin_raster(*gpu_input(shared, name, 1024, "nvdiffrast"), Simt())
     counters = measured(shared, name, 1024, "binRaster")
     assert work.total(E.SHARED_ATOMIC) == counters["ncu_sass", "smsp__sass_inst_executed_op_shared_atom.sum"]
 
@@ -161,5 +161,5 @@ TOTALS = (E.TRIANGLES, E.ROUNDS, E.BOX_BINS, E.SINGLE_LANES, E.FAST_LANES, E.SLO
     ],
 )
 def test_totals_are_those_of_the_specification(shared, name, release, expected):
-    _, work, _ = bin_raster(*gpu_input(shared, name, 1024, release), Simt())
+    _, (work,), _ = bin_raster(*gpu_input(shared, name, 1024, release), Simt())
     assert tuple(work.total(event) for event in TOTALS) == expected

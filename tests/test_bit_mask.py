@@ -15,7 +15,7 @@ from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, bit
 
 def draw(polygons, kind, lanes, spp=1):
     samples = new_samples(WIDTH, HEIGHT, sample_positions(spp))
-    return samples, bit_mask(polygons, samples, kind, lanes, GT200)
+    return samples, bit_mask(polygons, samples, kind, lanes, GT200).works[0]
 
 
 def flat_grid(cells=12, side=0.7):
@@ -105,7 +105,7 @@ def test_a_mask_too_large_for_shared_memory_is_read_from_global_memory():
     wide = np.array([[[0, 0, 0], [500, 0, 0], [500, 200, 0], [0, 200, 0]]], np.float32)
     samples = new_samples(512, 256, sample_positions(1))
     one = Micropolygons(wide, np.zeros(1, np.int32), np.zeros(1, np.uint8))
-    work = bit_mask(one, samples, "plain", 32, Simt())
+    work = bit_mask(one, samples, "plain", 32, Simt()).works[0]
     assert work.total(BitMaskEvent.MASK_READ_WARPS) == 0
     assert work.total(BitMaskEvent.GLOBAL_READ_WARPS) > 0
 

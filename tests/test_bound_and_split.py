@@ -37,7 +37,7 @@ def entries(subpatches):
 @pytest.mark.parametrize("rule", ["control_points", "pixel_extent"])
 def test_the_queue_is_that_of_a_slow_splitter(rule):
     points = bent()
-    subpatches, _ = split(points, bound_rule=rule)
+    subpatches, _, _ = split(points, bound_rule=rule)
     queue, passes = naive_patches.bound_and_split(points, VIEW.matrix(96, 64), 96, 64, 8.0, rule == "pixel_extent")
     assert entries(subpatches) == queue
     assert subpatches.passes.tolist() == passes
@@ -65,7 +65,7 @@ def test_every_queue_pass_is_that_of_the_measured_front_end(front_end, name):
     scene = front_end[name]
     points = load_scene(scene["model"]).patches.points
     size = scene["width"], scene["height"]
-    subpatches, _ = bound_and_split(
+    subpatches, _, _ = bound_and_split(
         points, scene["model_to_clip"], *size, scene["bound_pixels"], GTX280, counting=False
     )
     assert subpatches.passes[:, :4].tolist() == scene["queue_passes"]
@@ -79,22 +79,22 @@ def test_passes_add_up():
 
 
 def test_squares_of_a_patch_that_is_all_on_screen_tile_the_unit_square():
-    subpatches, _ = split(bent(patches=1))
+    subpatches, _, _ = split(bent(patches=1))
     assert subpatches.passes[:, [1, 4]].sum() == 0
     assert (0.25 ** subpatches.level.astype(np.float64)).sum() == 1.0
     assert len(set(entries(subpatches))) == len(subpatches.patch)
 
 
 def test_counting_changes_nothing_but_the_works():
-    counted, works = split(bent())
-    uncounted, none = split(bent(), counting=False)
+    counted, works, _ = split(bent())
+    uncounted, none, _ = split(bent(), counting=False)
     assert entries(counted) == entries(uncounted)
     assert works
-    assert none == []
+    assert none == ()
 
 
 def test_works_count_what_the_passes_say():
-    subpatches, works = split(bent())
+    subpatches, works, _ = split(bent())
     oracles = [work for work in works if work.kernel == "oracle"]
     events = [OracleEvent.EXAMINE_LANES, OracleEvent.CULLED, OracleEvent.KEPT, OracleEvent.SPLIT, OracleEvent.GIVEN_UP]
     assert [[work.total(event) for event in events] for work in oracles] == subpatches.passes.tolist()
@@ -104,7 +104,7 @@ def test_works_count_what_the_passes_say():
 
 
 def test_points_are_transformed_once_a_frame():
-    _, works = split(bent(patches=3))
+    _, works, _ = split(bent(patches=3))
     transforms = [work for work in works if work.kernel == "transform"]
     assert [work.total(TransformEvent.POINT_LANES) for work in transforms] == [48]
     # 48 points of 16 bytes: three half-warps of two full segments
@@ -113,7 +113,7 @@ def test_points_are_transformed_once_a_frame():
 
 
 def test_sub_patches_of_one_patch_share_the_loads_of_its_points():
-    _, works = split(bent(patches=1))
+    _, works, _ = split(bent(patches=1))
     first, second = [work for work in works if work.kernel == "oracle"][:2]
     # one segment for each of 16 points, and one for the queue entries, with one lane and with four
     assert first.total(OracleEvent.LOAD_TRANSACTIONS) == second.total(OracleEvent.LOAD_TRANSACTIONS) == 17
@@ -130,14 +130,14 @@ def test_a_warp_in_which_only_some_lanes_measure_a_box_diverges():
 def test_what_is_beside_the_screen_or_behind_the_eye_is_culled():
     beside = bent(patches=1) + np.float32([200, 0, 0, 0])
     behind = bent(patches=1) + np.float32([0, -50, 0, 0])
-    subpatches, _ = split(np.concatenate([beside, behind]))
+    subpatches, _, _ = split(np.concatenate([beside, behind]))
     assert subpatches.passes.tolist() == [[2, 2, 0, 0, 0]]
     assert len(subpatches.patch) == 0
 
 
 def test_a_patch_around_the_eye_ends_and_says_what_was_given_up():
     inside = LookAt((0.0, 0.0, 0.02), (1.0, 0.1, 0.0), (0.0, 0.0, 1.0), 60.0, 0.01, 10.0)
-    subpatches, _ = split(bent(), view=inside, max_depth=9)
+    subpatches, _, _ = split(bent(), view=inside, max_depth=9)
     assert len(subpatches.passes) <= 11
     assert subpatches.passes[:, 4].sum() > 0
     assert len(subpatches.patch) > 0
@@ -147,7 +147,7 @@ def test_a_patch_around_the_eye_ends_and_says_what_was_given_up():
 def test_from_inside_the_teapot_everything_kept_is_in_front_of_the_eye():
     points = load_scene("teapot").patches.points
     inside = LookAt((0.0, 0.0, 1.0), (1.0, 0.3, 1.0), (0.0, 0.0, 1.0), 70.0, 0.01, 10.0)
-    subpatches, _ = split(points, view=inside)
+    subpatches, _, _ = split(points, view=inside)
     assert len(subpatches.patch) > 500
     matrix = inside.matrix(96, 64)
     for patch, level, i, j in entries(subpatches)[::97]:

@@ -32,9 +32,9 @@ def some_boxes(number, bound, seed=1, step=1.5):
 
 def bucketed(boxes, tile, bound, simt, **options):
     tiles = screen_tiles(WIDTH, HEIGHT, tile, bound)
-    count, idx, works = bucket_count(boxes, tiles, simt, **options)
-    start, scans = bucket_scan(count, simt)
-    lists, writes = bucket_write(boxes, tiles, count, start, idx, simt)
+    (count, idx), works, _ = bucket_count(boxes, tiles, simt, **options)
+    start, scans, _ = bucket_scan(count, simt)
+    lists, writes, _ = bucket_write(boxes, tiles, count, start, idx, simt)
     return tiles, count, idx, start, lists, works, scans, writes
 
 
@@ -112,11 +112,11 @@ def test_nothing_depends_on_counting_or_on_threads():
         results.append(bucket_count(boxes, tiles, GT200))
     finally:
         set_num_threads(threads)
-    for count, idx, _ in results:
-        assert np.array_equal(count, results[0][0])
-        assert np.array_equal(idx, results[0][1])
-    assert np.array_equal(results[0][2][1].table, results[2][2][1].table)
-    assert np.array_equal(results[0][2][1].atomic_requests, results[2][2][1].atomic_requests)
+    for (count, idx), _, _ in results:
+        assert np.array_equal(count, results[0].outputs.counts)
+        assert np.array_equal(idx, results[0].outputs.idx)
+    assert np.array_equal(results[0].works[1].table, results[2].works[1].table)
+    assert np.array_equal(results[0].works[1].atomic_requests, results[2].works[1].atomic_requests)
 
 
 def test_an_empty_queue_makes_empty_lists():
@@ -128,7 +128,7 @@ def test_an_empty_queue_makes_empty_lists():
 def test_a_scan_of_more_than_a_block_scans_the_sums_of_blocks_and_adds_them_back():
     random = np.random.default_rng(5)
     count = random.integers(0, 50, 1024 * 1024 + 7).astype(np.uint32)
-    start, works = bucket_scan(count, H200)
+    start, works, _ = bucket_scan(count, H200)
     assert start.tolist() == [0, *np.cumsum(count)[:-1].tolist()]
     assert [(w.kernel, w.grid) for w in works] == [
         ("scan_blocks", 1025),
@@ -140,7 +140,7 @@ def test_a_scan_of_more_than_a_block_scans_the_sums_of_blocks_and_adds_them_back
 
 
 def test_a_scan_reads_and_writes_each_counter_once_a_level():
-    _, works = bucket_scan(np.zeros(1000, np.uint32), H200)
+    _, works, _ = bucket_scan(np.zeros(1000, np.uint32), H200)
     assert works[0].total(BucketScanEvent.LOAD_BYTES) == works[0].total(BucketScanEvent.STORE_BYTES) == 4000
 
 
@@ -161,7 +161,7 @@ def test_conflicts_of_the_measured_scenes(name, tile, shared):
             r["metric"]: int(r["value"]) for r in csv.DictReader(file) if (r["scene"], r["tile"]) == (name, str(tile))
         }
     tiles = screen_tiles(camera["width"], camera["height"], tile, camera["bound_pixels"])
-    count, _, works = bucket_count(grids.boxes, tiles, H200)
+    (count, _), works, _ = bucket_count(grids.boxes, tiles, H200)
     ours = {
         "atomic_instructions": works[1].total(Event.ATOMIC),
         "lane_atomics": works[1].total(Event.ATOMIC_LANES),

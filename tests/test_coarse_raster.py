@@ -38,14 +38,14 @@ def test_counting_changes_no_queue():
 
 
 def test_a_pending_clear_hands_on_every_tile_once():
-    queues, work, _ = coarse(small(), 300, 200)
+    queues, (work,), _ = coarse(small(), 300, 200)
     assert sorted(queues.active) == list(range(38 * 25))
     assert work.total(E.ACTIVE_TILES) == 38 * 25
 
 
 def test_without_a_clear_only_tiles_with_entries_are_handed_on():
     setup = small(3)._replace(subtriangles=np.repeat([1, 0], [20, 880]).astype(np.uint8))
-    queues, work, _ = coarse(setup, 300, 200, deferred_clear=False)
+    queues, (work,), _ = coarse(setup, 300, 200, deferred_clear=False)
     assert sorted(queues.active) == list(np.flatnonzero(np.diff(queues.starts)))
     assert work.total(E.BINS) <= 6
 
@@ -68,7 +68,7 @@ def test_initial_capacity_is_the_originals():
 
 @pytest.mark.parametrize(("name", "width"), SCENES)
 def test_tiles_hold_as_many_entries_as_on_the_gpu(shared, name, width):
-    queues, work, facts = coarse(*gpu_input(shared, name, width, "nvdiffrast"))
+    queues, (work,), facts = coarse(*gpu_input(shared, name, width, "nvdiffrast"))
     gpu = np.load(shared / f"silicon/ids/{name}_{width}.npz")["tilecount"].ravel()
     counters = measured(shared, name, width, "coarseRaster")
     assert np.array_equal(np.diff(queues.starts), gpu)
@@ -78,7 +78,7 @@ def test_tiles_hold_as_many_entries_as_on_the_gpu(shared, name, width):
 
 @pytest.mark.parametrize("name", ["bunny", "soup2k"])
 def test_shared_atomics_are_those_of_the_gpu(shared, name):
-    _, work, _ = coarse(*gpu_input(shared, name, 1024, "nvdiffrast"))
+    _, (work,), _ = coarse(*gpu_input(shared, name, 1024, "nvdiffrast"))
     counters = measured(shared, name, 1024, "coarseRaster")
     assert work.total(E.SHARED_ATOMIC) == counters["ncu_sass", "smsp__sass_inst_executed_op_shared_atom.sum"]
 
@@ -96,7 +96,7 @@ TOTALS = (E.ROUNDS, E.MERGES, E.TRIANGLES, E.TILES_TOUCHED, E.EMITS, E.SEGMENTS,
     ],
 )
 def test_totals_are_those_of_the_specification(shared, name, release, expected):
-    _, work, _ = coarse(*gpu_input(shared, name, 1024, release))
+    _, (work,), _ = coarse(*gpu_input(shared, name, 1024, release))
     assert tuple(work.total(event) for event in TOTALS) == expected
 
 

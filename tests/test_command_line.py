@@ -119,7 +119,7 @@ def test_a_map_that_the_pipeline_does_not_draw_leaves_no_picture_behind(tmp_path
 
 
 def test_without_counting_there_is_a_picture_and_no_time(tmp_path, capsys):
-    options = ["render", "teapot", *SMALL, "-O", "counting=False"]
+    options = ["render", "teapot", *SMALL, "--no-counting"]
     assert run_command(options) == BAD_INPUT
     assert "nothing was counted, so there is no time" in capsys.readouterr().err
     assert run_command([*options, "-o", str(tmp_path / "out.png")]) == 0

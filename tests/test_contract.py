@@ -7,12 +7,11 @@ from numba import get_num_threads, set_num_threads
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names
+from tilestamp.simulator.pipelines import load_pipeline, pipeline_names
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
 
 WIDTH, HEIGHT = 96, 72
-COUNTING = [name for name in pipeline_names() if "counting" in options_type(name).__struct_fields__]
 
 
 @pytest.fixture(scope="module", params=pipeline_names())
@@ -86,7 +85,7 @@ def test_the_first_line_of_a_pipeline_says_what_it_is():
         assert (load_pipeline(name).__doc__ or "").splitlines()[0].endswith("."), name
 
 
-@pytest.mark.parametrize("pipeline", COUNTING)
+@pytest.mark.parametrize("pipeline", pipeline_names())
 def test_counting_does_not_change_the_picture(pipeline):
     counted, plain = draw(pipeline), draw(pipeline, counting=False)
     assert (counted.image == plain.image).all()

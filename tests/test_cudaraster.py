@@ -8,6 +8,7 @@ import pytest
 from tests import naive_cudaraster as naive
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import cudaraster as module
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 from tilestamp.simulator.scenes.scene import Mesh, Scene
@@ -30,8 +31,8 @@ def soup(seed=1, count=60):
     return scene(positions, np.arange(3 * count).reshape(-1, 3), colors=colors)
 
 
-def draw(what, size=(40, 30), **options):
-    return cudaraster(what, EYE, *size, Simt(), CudarasterOptions(**options))
+def draw(what, size=(40, 30), counting=True, **options):
+    return cudaraster(what, EYE, *size, Simt(), CudarasterOptions(**options), Executor(counting=counting))
 
 
 def test_row_0_is_the_top_and_background_is_minus_1():
@@ -62,7 +63,7 @@ def test_model_space_goes_through_the_matrix():
     matrix = np.array([[0.5, 0, 0, 0.1], [0, 0.5, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 1.0]])
     positions = np.array([[-1, -1, 0, 1], [1, -1, 0.5, 1], [0, 1, 0, 1]], np.float32)
     model = Scene("model", mesh=Mesh(positions, np.array([[0, 1, 2]], np.int32)))
-    frame = cudaraster(model, matrix, 40, 30, Simt(), CudarasterOptions())
+    frame = cudaraster(model, matrix, 40, 30, Simt(), CudarasterOptions(), Executor())
     straight = draw(scene(positions @ matrix.T, [[0, 1, 2]]))
     assert np.array_equal(frame.triangle_ids, straight.triangle_ids)
     assert np.array_equal(frame.depth, straight.depth)
@@ -125,7 +126,7 @@ def test_a_first_frame_executes_the_stages_of_attempts_that_fail(monkeypatch):
 
 def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
-    monkeypatch.setattr("tilestamp.simulator.sampler.SMALLEST", 1)
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
     run = simulate(
         soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5, first_frame=True
     )

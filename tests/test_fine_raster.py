@@ -89,7 +89,7 @@ def test_pictures_are_the_plain_minimum_of_each_sample(seed, release, samples):
     size = (20, 13) if samples < 8 else (11, 9)
     spread, near = ((0.8, 0.0), (3.0, 0.0), (1.2, 0.6), (300.0, 0.3))[seed]
     positions, triangles = mesh_soup(seed, count=14 if spread < 100 else 40, spread=spread, near=near)
-    buffers, _ = draw(positions, triangles, size, release=release, samples=samples)
+    buffers, _, _ = draw(positions, triangles, size, release=release, samples=samples)
     ids, depths = naive.draw(positions, triangles, *size, release=release, samples=samples)
     assert len(ids) > 20
     for k in range(samples):
@@ -118,7 +118,7 @@ def grid(seed, n=6, shake=0.8):
 @settings(max_examples=8, derandomize=True, deadline=None)
 def test_a_watertight_mesh_has_no_hole_and_no_double_hit(samples, seed):
     size = (40, 24)
-    buffers, work = draw(*grid(seed), size, mode="color", samples=samples, cull=False)
+    buffers, (work,), _ = draw(*grid(seed), size, mode="color", samples=samples, cull=False)
     assert buffers.ids.min() >= 0
     assert work.total(E.SAMPLE_HITS) == size[0] * size[1] * samples
 
@@ -133,7 +133,7 @@ def test_shared_edges_on_sample_positions_hit_once(samples):
     positions = np.stack([x, y, np.zeros_like(x), np.ones_like(x)], -1).reshape(-1, 4)
     i = (np.arange(k - 1)[:, None] * k + np.arange(k - 1)).ravel()
     triangles = np.concatenate([np.stack([i, i + 1, i + k], -1), np.stack([i + 1, i + k + 1, i + k], -1)])
-    buffers, work = draw(positions, triangles, size, mode="color", samples=samples)
+    buffers, (work,), _ = draw(positions, triangles, size, mode="color", samples=samples)
     assert buffers.ids.min() >= 0
     assert work.total(E.SAMPLE_HITS) == 256 * samples
 
@@ -145,7 +145,7 @@ def test_a_fan_of_slivers_has_no_hole(samples):
     rim[-1] = rim[0]
     positions = np.concatenate([[[0.01, 0.02, 0, 1]], rim])
     triangles = [[0, i, i + 1] for i in range(1, 400)]
-    buffers, work = draw(positions, triangles, (32, 24), mode="color", samples=samples)
+    buffers, (work,), _ = draw(positions, triangles, (32, 24), mode="color", samples=samples)
     assert buffers.ids.min() >= 0
     assert work.total(E.SAMPLE_HITS) == 32 * 24 * samples
 
@@ -163,10 +163,10 @@ def test_blending_is_that_of_triangles_drawn_one_after_another():
     rng = np.random.default_rng(3)
     positions, triangles = mesh_soup(7, count=40, spread=0.9)
     colors = rng.uniform(0, 1, (len(positions), 4)).astype(np.float32)
-    together, _ = draw(positions, triangles, mode="blend", colors=colors, cull=False)
+    together, _, _ = draw(positions, triangles, mode="blend", colors=colors, cull=False)
     apart = None
     for triangle in triangles:
-        apart, _ = draw(positions, [triangle], mode="blend", colors=colors, cull=False, buffers=apart)
+        apart, _, _ = draw(positions, [triangle], mode="blend", colors=colors, cull=False, buffers=apart)
     assert np.array_equal(together.color, apart.color)
     assert len(np.unique(together.color)) > 100
 
@@ -180,7 +180,7 @@ def test_a_transparent_layer_mixes_by_its_alpha():
 def test_colours_are_interpolated_with_perspective():
     positions = [[-1, -1, 0, 1], [3 * 4, -4, 0, 4], [-1, 3, 0, 1]]
     colors = np.array([[0, 0, 0, 1], [1, 1, 1, 1], [0, 0, 0, 1]], np.float32)
-    buffers, _ = draw(positions, [[0, 1, 2]], (64, 64), colors=colors)
+    buffers, _, _ = draw(positions, [[0, 1, 2]], (64, 64), colors=colors)
     for i in (3, 20, 50):
         x, y = (2 * i + 1) / 64 - 1, 1 / 64 - 1
         flat = (x + 1) / 4  # screen-space weight of vertex 1
@@ -191,20 +191,20 @@ def test_colours_are_interpolated_with_perspective():
 
 def test_without_interpolation_the_last_vertex_gives_the_colour():
     colors = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
-    buffers, _ = draw(FULL, [[0, 1, 2]], mode="color", colors=colors)
+    buffers, _, _ = draw(FULL, [[0, 1, 2]], mode="color", colors=colors)
     assert set(buffers.color.ravel()) == {0xFFFF0000}
 
 
 def test_depth_only_writes_no_colour():
-    buffers, _ = draw(FULL, [[0, 1, 2]], mode="depth-only", clear_color=0x01020304)
+    buffers, _, _ = draw(FULL, [[0, 1, 2]], mode="depth-only", clear_color=0x01020304)
     assert set(buffers.color.ravel()) == {0x01020304}
     assert buffers.depth.max() < DEPTH_MAX
 
 
 def test_clear_depth_hides_what_is_behind_it():
     assert clear_depth_value(1.0) == DEPTH_MAX
-    behind, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.4)
-    before, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.6)
+    behind, _, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.4)
+    before, _, _ = draw(FULL, [[0, 1, 2]], clear_depth=0.6)
     assert (behind.ids.max(), before.ids.min()) == (-1, 0)
 
 
@@ -220,6 +220,6 @@ def test_ids_and_depths_are_those_of_an_h200(shared, scene, width):
     folder = shared / "silicon" / "ids"
     with np.load(folder / f"{scene}_input.npz") as data, np.load(folder / f"{scene}_{width}.npz") as gpu:
         height = gpu["id"].shape[0]
-        buffers, _ = draw(data["positions"], data["triangles"], (width, height), release="nvdiffrast")
+        buffers, _, _ = draw(data["positions"], data["triangles"], (width, height), release="nvdiffrast")
         assert np.array_equal(buffers.ids[0, :height, :width] + 1, gpu["id"])
         assert np.array_equal(buffers.depth[0, :height, :width], gpu["depth"])

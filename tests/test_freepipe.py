@@ -8,6 +8,7 @@ import pytest
 from tests.naive_bins import covers
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.freepipe import FreepipeOptions
 from tilestamp.simulator.pipelines.freepipe import freepipe as pipeline
 from tilestamp.simulator.scenes.scene import Mesh, Scene
@@ -165,7 +166,7 @@ def test_the_pipeline_puts_the_top_row_first():
     positions, triangles = flat([(0, 0), (64, 0), (0, 20)])
     scene = Scene("low", mesh=Mesh(positions, triangles, clip_space=True))
     for packing in ("64", "32"):
-        frame = pipeline(scene, np.eye(4), 64, 64, Simt(), FreepipeOptions(packing=packing))
+        frame = pipeline(scene, np.eye(4), 64, 64, Simt(), FreepipeOptions(packing=packing), Executor())
         assert frame.triangle_ids[-1, 0] == 0
         assert frame.triangle_ids[0, 0] == -1
         assert frame.image[-1, 0].min() > 0

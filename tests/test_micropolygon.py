@@ -5,6 +5,7 @@ import pytest
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.micropolygon import MicropolygonOptions, micropolygon
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.simulation import simulate
@@ -16,10 +17,12 @@ GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)
 WIDTH, HEIGHT = 160, 120
 
 
-def teapot(**options):
+def teapot(counting=True, **options):
     scene = load_scene("teapot")
     matrix = read_camera("default", scene).matrix(WIDTH, HEIGHT)
-    return micropolygon(scene, matrix, WIDTH, HEIGHT, options.pop("simt", GT200), MicropolygonOptions(**options))
+    execute = Executor(counting=counting)
+    simt = options.pop("simt", GT200)
+    return micropolygon(scene, matrix, WIDTH, HEIGHT, simt, MicropolygonOptions(**options), execute)
 
 
 def by_kernel(frame):
@@ -82,7 +85,7 @@ def test_the_hybrid_covers_what_the_tiles_cover():
 
 def test_a_scene_without_patches_is_refused():
     with pytest.raises(TilestampError, match="draws patches, and nothing has none"):
-        micropolygon(Scene("nothing"), np.eye(4), 64, 64, GT200, MicropolygonOptions())
+        micropolygon(Scene("nothing"), np.eye(4), 64, 64, GT200, MicropolygonOptions(), Executor())
 
 
 def test_a_near_limit_culls_what_lies_before_it():

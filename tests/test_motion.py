@@ -23,7 +23,7 @@ PATTERNS = {"stratified": stratified_pattern(4, tile=3), "interleaved": interlea
 
 def draw(algorithm, polygons, pattern):
     samples = blur_samples(WIDTH, HEIGHT, pattern)
-    return samples, algorithm(polygons, pattern, samples)
+    return samples, algorithm(polygons, pattern, samples).works[0]
 
 
 def blurred(count=10, way=(4.0, -2.0), seed=3):

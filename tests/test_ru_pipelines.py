@@ -11,6 +11,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines import pipeline_options
 from tilestamp.simulator.pipelines.per_primitive import per_primitive
@@ -49,7 +50,7 @@ def rng_light():
 
 def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
     name = "tiled" if pipeline is tiled else "per-primitive"
-    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, pipeline_options(name, options))
+    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, pipeline_options(name, options), Executor())
 
 
 def work(frame, kernel):
@@ -86,7 +87,7 @@ def test_with_samples_at_corners_lists_and_pixels_are_the_originals_on_a_gpu(sha
     given, gpu = (np.load(shared / f"silicon/textured/{part}/ru_{name}.npz") for part in ("inputs", "measured/ids"))
     corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
     made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
-    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}))
+    frame = tiled(made, given["matrix"], 800, 800, SIMT, pipeline_options("tiled", {"samples": "corners"}), Executor())
     assert (frame.maps["list length"][::-1].ravel() == gpu["t8c_cnt"].ravel()).all()
     assert np.count_nonzero(frame.triangle_ids[::-1].ravel() != gpu["t8c_id"].ravel()) <= 1  # equal depths
 
@@ -98,7 +99,9 @@ def test_per_primitive_tests_as_many_pixels_as_the_original_does(shared, name):
     corners = np.column_stack([given["positions"], np.ones(len(given["positions"]), np.float32)])
     made = Scene(name, mesh=Mesh(corners, given["triangles"].astype(np.int32)))
     options = pipeline_options("per-primitive", {"samples": "corners"})
-    counts = work(per_primitive(made, given["matrix"], 800, 800, SIMT, options), "per_primitive_raster").counts()
+    counts = work(
+        per_primitive(made, given["matrix"], 800, 800, SIMT, options, Executor()), "per_primitive_raster"
+    ).counts()
     counted = (shared / f"silicon/textured/source_on_cpu/ru_{name}.csv").read_text().splitlines()
     for event in ("sample_tests", "sample_hits"):
         assert f"per_primitive_cull,_rasterize,{event},{counts[event.upper()]}" in counted
@@ -106,7 +109,7 @@ def test_per_primitive_tests_as_many_pixels_as_the_original_does(shared, name):
 
 def test_attributes_are_perspective_correct_within_1e_5(scene, matrix):
     mesh = geometry(scene)
-    vertices, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
+    vertices, _, _ = vertex_shading(mesh, matrix, WIDTH, HEIGHT, SIMT)
     frame = draw(scene, matrix)
     fragments = interpolate(mesh, vertices, Visible(frame.triangle_ids, frame.depth))
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT)
@@ -196,7 +199,7 @@ def test_a_warp_walks_the_widest_box_of_each_row_of_tiles(matrix):
         screen, np.arange(6, dtype=np.int32).reshape(2, 3), np.arange(2, dtype=np.int32), WIDTH, HEIGHT, SIMT,
         tile=8, culling=False, capacity="safe",
     )  # fmt: skip
-    assert lists[1][-1].counts()["BOX_STEPS"] == 4 + 1 + 1 + 1
+    assert lists.works[-1].counts()["BOX_STEPS"] == 4 + 1 + 1 + 1
 
 
 def test_each_part_of_a_model_is_transformed_and_assembled_by_itself(scene, matrix):
@@ -278,7 +281,7 @@ def test_occlusion_only_darkens(scene, matrix):
 
 
 def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
-    blurred, work = occlusion_blur(rng_light, SIMT)
+    blurred, (work,), _ = occlusion_blur(rng_light, SIMT)
     for y, x in [(0, 0), (1, 30), (20, 20), (HEIGHT - 1, WIDTH - 1)]:
         window = rng_light[max(y - 2, 0) : y + 2, max(x - 2, 0) : x + 2]
         assert blurred[y, x] == pytest.approx(window.mean(), rel=1e-6)
@@ -287,7 +290,7 @@ def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
 
 def test_the_blur_loads_and_stores_as_often_as_an_h200_counts():
     """Measured on the original at 800x800: a sector for each thread that loads, and for each that stores."""
-    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt())[1].counts()
+    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt()).works[0].counts()
     assert counts["STORE_TRANSACTIONS"] == 640_000
     assert counts["LOAD_TRANSACTIONS"] == pytest.approx(1_429_963, rel=0.01)
     assert (counts["WARPS"], counts["BLUR_WARPS"]) == (50_000, 40_000)

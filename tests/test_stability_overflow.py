@@ -22,6 +22,7 @@ from tilestamp.experiments.stability import (
 from tilestamp.experiments.stability.patch_frames import split
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import shared_edges, snap_edges
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
@@ -74,7 +75,7 @@ def test_both_cures_leave_no_crack(cure):
 
 
 def test_snapped_vertices_lie_on_an_edge_of_a_coarser_neighbour():
-    made, snapped = cracks.front_end(BOUND, 2), cracks.snapped(BOUND, 2).grids.vertices
+    made, snapped = cracks.front_end(BOUND, 2), cracks.snapped(BOUND, 2).outputs.grids.vertices
     moved = np.argwhere((snapped[..., :3] != made.grids.vertices[..., :3]).any(axis=2))
     assert len(moved) > 50
     levels = made.subpatches.level
@@ -108,7 +109,7 @@ def test_snapping_does_not_depend_on_the_way_a_patch_is_turned():
     counts = []
     for points in (sheet, turned):
         made = split(points, cracks.VIEW.matrix(320, 240), 320, 240, bound=BOUND)
-        counts.append(int(snap_edges(made.subpatches, made.grids, shared_edges(points)).touched.sum()))
+        counts.append(int(snap_edges(points, made.subpatches, made.grids, Simt()).outputs.touched.sum()))
     assert counts[0] == counts[1] > 0
 
 

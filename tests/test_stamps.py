@@ -30,7 +30,7 @@ def soup(count=24, corners=4, size=3.0, seed=1):
 
 def draw(polygons, shape, spp=1, simt=GT200):
     samples = new_samples(WIDTH, HEIGHT, sample_positions(spp))
-    return samples, stamps(polygons, samples, shape, simt)
+    return samples, stamps(polygons, samples, shape, simt).works[0]
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_a_filled_coarse_stamp_is_accepted_without_a_test():
     square = np.array([[[-1, -1, 0.5], [9, -1, 0.5], [9, 9, 0.5], [-1, 9, 0.5]]], np.float32)
     one = Micropolygons(square[:, [0, 1, 3]] * 3, np.zeros(1, np.int32), np.zeros(1, np.uint8))
     samples = new_samples(8, 8, sample_positions(1))
-    work = stamps(one, samples, stamp_shape(2, "box", 8), GT200)
+    work = stamps(one, samples, stamp_shape(2, "box", 8), GT200).works[0]
     assert (work.total(StampsEvent.FILLED_SAMPLES), work.total(StampsEvent.SAMPLE_TESTS)) == (64, 0)
 
 

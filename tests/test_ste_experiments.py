@@ -6,6 +6,7 @@ import pytest
 from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eisenacher
 from tilestamp.experiments.ste.setting import cube, mean_area, random_polygons, student
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_options
 from tilestamp.simulator.scenes import load_scene, read_camera
 
@@ -78,7 +79,7 @@ def test_a_subdivided_cube_fits_its_window():
 def draw(name, **options):
     scene = load_scene("teapot")
     matrix = read_camera("default", scene).matrix(80, 60)
-    return load_pipeline(name)(scene, matrix, 80, 60, Simt(), pipeline_options(name, options))
+    return load_pipeline(name)(scene, matrix, 80, 60, Simt(), pipeline_options(name, options), Executor())
 
 
 def test_exact_pipelines_draw_the_same_picture():

@@ -41,11 +41,11 @@ def some_grids(number, size=4.0, seed=7):
 def drawn(vertices, tile=8, simt=H200, width=WIDTH, height=HEIGHT, bound=4, **options):
     boxes = np.hstack([vertices[..., :2].min(axis=1), vertices[..., :2].max(axis=1)])
     tiles = screen_tiles(width, height, tile, bound)
-    count, idx, _ = bucket_count(boxes, tiles, simt, counting=False)
-    start, _ = bucket_scan(count, simt, counting=False)
-    lists, _ = bucket_write(boxes, tiles, count, start, idx, simt, counting=False)
+    (count, idx), _, _ = bucket_count(boxes, tiles, simt, counting=False)
+    start, _, _ = bucket_scan(count, simt, counting=False)
+    lists, _, _ = bucket_write(boxes, tiles, count, start, idx, simt, counting=False)
     result = tile_raster(vertices, count, start, lists, tiles, width, height, simt, **options)
-    return *result, tiles, [lists[s : s + n].tolist() for s, n in zip(start, count, strict=True)]
+    return *result.outputs, result.works, tiles, [lists[s : s + n].tolist() for s, n in zip(start, count, strict=True)]
 
 
 @pytest.mark.parametrize("box_tests", [True, False])

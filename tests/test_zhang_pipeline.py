@@ -13,6 +13,7 @@ from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
 from tilestamp.simulator.scenes.camera import LookAt
@@ -44,7 +45,7 @@ def matrix():
 
 
 def draw(scene, matrix, **options):
-    return binned(scene, matrix, WIDTH, HEIGHT, SIMT, BinnedOptions(**options))
+    return binned(scene, matrix, WIDTH, HEIGHT, SIMT, BinnedOptions(**options), Executor())
 
 
 def work(frame, stage):
@@ -152,7 +153,8 @@ def test_at_1080_the_top_24_rows_stay_empty_as_on_a_gpu(shared):
     name = "zh_bunny_5k_near.npz"
     given, gpu = (np.load(shared / f"silicon/textured/{part}/{name}") for part in ("inputs", "measured/ids"))
     made = Scene("bunny", mesh=Mesh(given["positions"], given["triangles"].astype(np.int32)))
-    ids = binned(made, given["matrix"], 1920, 1080, SIMT, BinnedOptions(original_faults=True)).triangle_ids[::-1]
+    options = BinnedOptions(original_faults=True)
+    ids = binned(made, given["matrix"], 1920, 1080, SIMT, options, Executor()).triangle_ids[::-1]
     assert np.flatnonzero((gpu["id"] >= 0).any(axis=1)).max() == 1055
     assert ((ids >= 0) != (gpu["id"] >= 0)).sum() < 20  # float32 edges: 15 of 612,751
 
@@ -209,7 +211,7 @@ def test_the_machine_limits_the_cooperative_launch():
 
 def test_a_picture_beyond_the_bins_is_refused(scene):
     with pytest.raises(TilestampError, match="2048"):
-        binned(scene, CAMERA.matrix(2100, 100), 2100, 100, SIMT, BinnedOptions())
+        binned(scene, CAMERA.matrix(2100, 100), 2100, 100, SIMT, BinnedOptions(), Executor())
 
 
 @pytest.mark.parametrize("optimized", [True, False])
@@ -279,10 +281,10 @@ def test_stores_that_scatter_leave_an_sm_at_their_own_rate():
 def test_coordinates_of_a_quad_are_perspective_correct_within_1e_5(scene, matrix):
     """Planes of 1/w and of coordinates over w, against the division at each pixel in double precision."""
     mesh = geometry(scene)
-    vertices, _ = vertex_fetch_and_shading(mesh, matrix, SIMT)
-    slots, _ = primitive_assembly(mesh, vertices, WIDTH, HEIGHT, SIMT)
-    primitives, _ = primitive_compaction(slots, len(mesh.triangles), SIMT)
-    data, _ = triangle_setup(primitives, SIMT)
+    vertices, _, _ = vertex_fetch_and_shading(mesh, matrix, SIMT)
+    slots, _, _ = primitive_assembly(mesh, vertices, WIDTH, HEIGHT, SIMT)
+    primitives, _, _ = primitive_compaction(slots, len(mesh.triangles), SIMT)
+    data, _, _ = triangle_setup(primitives, SIMT)
     screen = naive.project(scene.mesh.positions, matrix, WIDTH, HEIGHT) * (1, -1, 1, 1) + (0, HEIGHT, 0, 0)
     uv = np.zeros((4, 2), np.float32)
     whole = np.flatnonzero(np.bincount(data.ids, minlength=len(mesh.triangles)) == 1)  # not clipped

@@ -29,6 +29,7 @@ def render(
     fidelity: Literal["counts", "bounds", "auto", "schedule"] = "schedule",
     error: float = 0.0,
     seed: int = 0,
+    counting: bool = True,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
@@ -58,6 +59,8 @@ def render(
         its 95 % interval, and there is no picture.
     seed
         Of the random part.
+    counting
+        Count what the machine does; without it there is a picture and no time.
     output
         PNG file for the picture.
     map_
@@ -74,9 +77,10 @@ def render(
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
     options = given_options(options_type(pipeline), flags, option)
+    asked: dict[str, Any] = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting}
+    asked |= {"picture": output is not None} | options
     with progress(f"drawing {scene}") as say:
-        asked = {"fidelity": fidelity, "error": error, "seed": seed, "picture": output is not None}
-        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked | options)
+        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked)
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
             _ = run.stages

@@ -145,8 +145,8 @@ def _patches(subject: Subject) -> Geometry:
     patches = subject.scene.patches
     assert patches is not None  # noqa: S101 - chosen by kind
     size, simt = (subject.width, subject.height), load_machine("h200").simt
-    parts, _ = bound_and_split(patches.points, subject.matrix, *size, FINE_BOUND, simt, counting=False)
-    grids, _ = dice(patches.points, parts, subject.matrix, *size, simt, counting=False)
+    parts, _, _ = bound_and_split(patches.points, subject.matrix, *size, FINE_BOUND, simt, counting=False)
+    grids, _, _ = dice(patches.points, parts, subject.matrix, *size, simt, counting=False)
     corner = np.arange(12).reshape(3, 4)[:, :3].ravel()
     halves = np.stack([corner, corner + 1, corner + 5, corner, corner + 5, corner + 4], axis=1).reshape(-1, 3)
     vertices = grids.vertices[:, halves].reshape(-1, 3, 4)

@@ -18,7 +18,7 @@ from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.sampling_plot import sampling_plot
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampler import SMALLEST
+from tilestamp.simulator.sampling.executor import PAYS
 from tilestamp.simulator.scenes.library import load_scene, with_views
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
@@ -201,14 +201,13 @@ def _notes(table: "pd.DataFrame") -> list[str]:
             + "."
         ),
         (
-            "What is left is not tiles: bound and split runs in full, for where the sub-patches are decides all else; "
-            "all triangles are set up, binned and listed; and the launches are priced unit by unit."
+            "Only the last stage is sampled, whose outputs nothing but the picture needs: sub-patches are split, diced "
+            "and bucketed, triangles set up, binned and listed in full; and the launches are priced unit by unit."
         ),
         f"Intervals of the four numbers of the frame that held the full run's value: {np.mean(inside):.0%}.",
         (
-            f"Frames below {SMALLEST:,} primitives run in full at once, without the picture: a sample would cost more. "
-            "Where the tail of a launch decides, a change of a percent in any block moves the frame by several: all "
-            "units of its stage run after the sample. The dearest run beside the full one: "
+            f"Frames whose last stage takes less than about {PAYS:g} seconds run in full: a sample would cost more. "
+            "The dearest run beside the full one: "
             f"{table.share_of_full.max():.2f} of it."
         ),
     ]

@@ -9,6 +9,7 @@ from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.used import remembered
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import plain
@@ -56,7 +57,7 @@ def draw(area: float, name: str = MACHINE) -> tuple[Run, int]:
     machine = load_machine(name)
     scene = Scene.sweep(area, WIDTH, HEIGHT)
     options = CudarasterOptions(mode="color")
-    frame = cudaraster(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, options)
+    frame = cudaraster(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, options, Executor())
     assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)

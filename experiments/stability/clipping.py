@@ -126,8 +126,8 @@ def by_pipeline(pipeline: str, **options: Any) -> Callable[[Scene], NDArray[np.b
 def as_tiled(scene: Scene) -> NDArray[np.bool_]:
     """Pixels of ``tiled`` and ``per-primitive``: no clipping; what has a corner behind the eye is dropped."""
     mesh, simt = geometry(scene), machine().simt
-    vertices, _ = vertex_shading(mesh, np.eye(4), SIZE, SIZE, simt)
-    drawable, _ = primitive_assembly(mesh, vertices, simt)
+    vertices, _, _ = vertex_shading(mesh, np.eye(4), SIZE, SIZE, simt)
+    drawable, _, _ = primitive_assembly(mesh, vertices, simt)
     count = np.zeros((SIZE, SIZE), np.int64)
     barycentric_cover(vertices.screen, mesh.triangles[drawable], count, np.ones((SIZE, SIZE), np.float32))
     return count > 0

@@ -65,8 +65,8 @@ def frame(length: float, *, welded: bool = False) -> Split:
     points = dome(length, welded=welded)
     view = LookAt(CENTRE + TURN @ (3, 2, 3), CENTRE + TURN @ (0.4, 0.4, 0.5), tuple(TURN[:, 2]), 30.0, 0.1, 20.0)
     matrix = view.matrix(SIZE, SIZE)
-    subpatches, works = bound_and_split(points, matrix, SIZE, SIZE, 4, simt_of(MACHINE))
-    grids, diced = dice(points, subpatches, matrix, SIZE, SIZE, simt_of(MACHINE), texture=WHITE)
+    subpatches, works, _ = bound_and_split(points, matrix, SIZE, SIZE, 4, simt_of(MACHINE))
+    grids, diced, _ = dice(points, subpatches, matrix, SIZE, SIZE, simt_of(MACHINE), texture=WHITE)
     return Split(subpatches, grids, works + diced)
 
 
@@ -130,8 +130,8 @@ def _teapot() -> str:
     scene = load_scene("teapot")
     assert scene.patches is not None  # noqa: S101 - it is made of patches
     matrix = scene.views["default"].matrix(320, 240)
-    subpatches, _ = bound_and_split(scene.patches.points, matrix, 320, 240, 4, simt_of(MACHINE))
-    grids, _ = dice(scene.patches.points, subpatches, matrix, 320, 240, simt_of(MACHINE))
+    subpatches, _, _ = bound_and_split(scene.patches.points, matrix, 320, 240, 4, simt_of(MACHINE))
+    grids, _, _ = dice(scene.patches.points, subpatches, matrix, 320, 240, simt_of(MACHINE))
     x, y = (grids.vertices[:, :, axis].reshape(-1, 4, 4).astype(np.float64) for axis in (0, 1))
     width, height = ((c[:, 1:, 1:] - c[:, :-1, :-1], c[:, 1:, :-1] - c[:, :-1, 1:]) for c in (x, y))
     area = width[0] * height[1] - width[1] * height[0]

@@ -19,7 +19,8 @@ from tilestamp.experiments.stability.patch_frames import MACHINE, Drawn, Split, 
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import wrong_pixels
 from tilestamp.simulator.scenes.camera import LookAt
-from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, shared_edges, snap_edges, snap_works
+from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, snap_edges
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,16 +60,16 @@ def front_end(bound: float, seed: int, *, one_depth: bool = False) -> Split:
 
 
 @cache
-def snapped(bound: float, seed: int) -> Snapped:
+def snapped(bound: float, seed: int) -> StageResult[Snapped]:
     """Snap the finer edges of a sheet to the coarser."""
     made = front_end(bound, seed)
-    return snap_edges(made.subpatches, made.grids, shared_edges(sheet(seed)))
+    return snap_edges(sheet(seed), made.subpatches, made.grids, simt_of(MACHINE))
 
 
 @cache
 def frame(bound: float, seed: int, cure: Cure) -> Drawn:
     """Draw a sheet."""
-    grids = snapped(bound, seed).grids if cure == "snapped edges" else None
+    grids = snapped(bound, seed).outputs.grids if cure == "snapped edges" else None
     made = front_end(bound, seed, one_depth=cure == "one depth")
     return draw(grids or made.grids, WIDTH, HEIGHT, bound=bound)
 
@@ -132,11 +133,11 @@ def _row(bound: float, cure: Cure) -> dict[str, float | str]:
     works += [work for seed in SEEDS for work in frame(bound, seed, cure).works]
     extra = lookups = 0  # sub-patches that are diced again, for the ends of the lines
     if cure == "snapped edges":
-        for seed, front in zip(SEEDS, fronts, strict=True):
+        for seed in SEEDS:
             snap = snapped(bound, seed)
-            works += snap_works(snap, front.subpatches.patch, CELLS**2, simt_of(MACHINE))
-            extra += int(snap.touched.sum())
-            lookups += int(snap.lookups.sum())
+            works += snap.works
+            extra += int(snap.outputs.touched.sum())
+            lookups += int(snap.outputs.lookups.sum())
     return {
         "bound": bound,
         "cure": cure,
@@ -160,7 +161,7 @@ def _boundary(table: "pd.DataFrame", cure: Cure) -> Boundary:
     cost = (
         f"at bound {at:g} one depth takes {one['sub-patches'] / plain['sub-patches']:.1f} times the sub-patches and "
         f"{one.ms:.3g} ms instead of {plain.ms:.3g}; snapping {snap.ms:.3g} ms for {snap.snapped:.0f} sub-patches that "
-        f"are diced again, and {snap.lookups:.0f} look-ups that are not priced"
+        f"are diced again, and {snap.outputs.lookups:.0f} look-ups that are not priced"
     )
     return Boundary("micropolygon", "bound", "pixels", *found, wrong, "one depth, or snapped edges", cost)
 

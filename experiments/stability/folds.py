@@ -62,7 +62,7 @@ def strip(fold: float, turn: float) -> Micropolygons:
 def exact(fold: float, turn: float) -> tuple[NDArray[np.int32], "Work"]:
     """Nearest micropolygon of each pixel, without a mask, and the work of that."""
     samples = _samples()
-    work = across_polygons(strip(fold, turn), samples, "in-order", simt_of(MACHINE))
+    work = across_polygons(strip(fold, turn), samples, "in-order", simt_of(MACHINE)).works[0]
     return samples.polygon, work
 
 
@@ -70,7 +70,7 @@ def exact(fold: float, turn: float) -> tuple[NDArray[np.int32], "Work"]:
 def masked(fold: float, turn: float, kind: MaskKind) -> tuple[NDArray[np.int32], "Work"]:
     """The same under a mask, and its work."""
     samples = _samples()
-    work = bit_mask(strip(fold, turn), samples, kind, simt_of(MACHINE).warp, simt_of(MACHINE))
+    work = bit_mask(strip(fold, turn), samples, kind, simt_of(MACHINE).warp, simt_of(MACHINE)).works[0]
     return samples.polygon, work
 
 

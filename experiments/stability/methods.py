@@ -172,7 +172,7 @@ def _grid_cover(corners: NDArray[np.float64], size: int) -> Cover:
     lists = np.tile(np.arange(len(corners), dtype=np.uint32), tiles.total)
     start = (np.arange(tiles.total) * len(corners)).astype(np.uint32)
     simt = machine().simt
-    _, depth, overdraw, _ = tile_raster(vertices, count, start, lists, tiles, size, size, simt)
+    (_, depth, overdraw), _, _ = tile_raster(vertices, count, start, lists, tiles, size, size, simt)
     assert overdraw is not None  # noqa: S101 - counting is on
     return Cover(depth[::-1] < 1, int(overdraw.sum()))
 

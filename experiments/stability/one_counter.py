@@ -49,7 +49,7 @@ def address_ms(share: float, machine: str, variant: str) -> float:
     """Modelled time of the address calculation."""
     padding, aggregate = VARIANTS[variant]
     tiles = screen_tiles(WIDTH, HEIGHT, TILE, 4)
-    works = bucket_count(boxes(share), tiles, simt_of(machine), padding=padding, aggregate=aggregate)[2]
+    works = bucket_count(boxes(share), tiles, simt_of(machine), padding=padding, aggregate=aggregate).works
     return milliseconds([work for work in works if work.kernel == "address_calculation"], machine)
 
 

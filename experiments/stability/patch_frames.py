@@ -28,7 +28,7 @@ class Split(NamedTuple):
 
     subpatches: SubPatches
     grids: Grids
-    works: list[Work]
+    works: tuple[Work, ...]
 
     @property
     def given_up(self) -> int:
@@ -41,7 +41,7 @@ class Drawn(NamedTuple):
 
     image: NDArray[np.uint8]  # (H, W, 3)
     hits: NDArray[np.int32]  # (H, W) quads that cover each sample
-    works: list[Work]
+    works: tuple[Work, ...]
 
 
 def split(
@@ -59,8 +59,8 @@ def split(
     """Bound and split, and dice."""
     simt = simt or simt_of(MACHINE)
     limits = {"near": near, "min_depth": min_depth, "max_depth": max_depth}
-    subpatches, works = bound_and_split(points, matrix, width, height, bound, simt, **limits)  # type: ignore[arg-type]
-    grids, diced = dice(points, subpatches, matrix, width, height, simt)
+    subpatches, works, _ = bound_and_split(points, matrix, width, height, bound, simt, **limits)  # type: ignore[arg-type]
+    grids, diced, _ = dice(points, subpatches, matrix, width, height, simt)
     return Split(subpatches, grids, works + diced)
 
 
@@ -71,18 +71,18 @@ def draw(
     simt = simt or simt_of(MACHINE)
     tiles = screen_tiles(width, height, tile, bound)
     count, start, lists, works = bucket(grids.boxes, tiles, simt)
-    image, _, hits, drawn = tile_raster(grids.vertices, count, start, lists, tiles, width, height, simt)
+    (image, _, hits), drawn, _ = tile_raster(grids.vertices, count, start, lists, tiles, width, height, simt)
     assert hits is not None  # noqa: S101 - it is counted
     return Drawn(image, hits, works + drawn)
 
 
 def bucket(
     boxes: NDArray[np.float32], tiles: Tiles, simt: Simt
-) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32], list[Work]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32], tuple[Work, ...]]:
     """Count, scan and write: COUNT, START, LISTS and the works."""
-    count, idx, counted = bucket_count(boxes, tiles, simt)
-    start, scanned = bucket_scan(count, simt)
-    lists, written = bucket_write(boxes, tiles, count, start, idx, simt)
+    (count, idx), counted, _ = bucket_count(boxes, tiles, simt)
+    start, scanned, _ = bucket_scan(count, simt)
+    lists, written, _ = bucket_write(boxes, tiles, count, start, idx, simt)
     return count, start, lists, counted + scanned + written
 
 

@@ -55,13 +55,13 @@ def attempt(count: int, shape: str = "screen") -> Attempt:
     positions = _clipped() if shape == "clipped" else _screen()
     triangles = np.tile(np.arange(3, dtype=np.int32), (count, 1))
     given: dict[str, Any] = {"width": SIZE, "height": SIZE, "simt": simt_of(MACHINE), "release": "1.1"}
-    setup, setup_work, facts = triangle_setup(positions, triangles, **given, capacity=8 * count + SLACK)
-    queues, bin_work, bin_facts = bins.bin_raster(setup, **given)
+    setup, (setup_work,), facts = triangle_setup(positions, triangles, **given, capacity=8 * count + SLACK)
+    queues, (bin_work,), bin_facts = bins.bin_raster(setup, **given)
     needed = {"sub-triangles": facts["numSubtris"], "bin segments": bin_facts["num_bin_segments"]}
     room = {"sub-triangles": count + SLACK, "bin segments": bins.initial_capacity(count, SIZE, SIZE)}
     works = [setup_work, bin_work]
     if shape == "screen":
-        _, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=True, **given)
+        _, (tile_work,), tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=True, **given)
         needed["tile segments"] = tile_facts["num_tile_segments"]
         room["tile segments"] = tiles.initial_capacity(count, SIZE, SIZE)
         works.append(tile_work)

@@ -17,13 +17,13 @@ from tilestamp.models.price import price
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
 from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask
-from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 
@@ -34,7 +34,7 @@ WIDTH, HEIGHT = 1024, 768
 MOST_POLYGONS = 100_000
 MOST_PIXELS = 1_000_000.0
 
-Draw = Callable[[Micropolygons, Samples, Simt], Work]
+Draw = Callable[[Micropolygons, Samples, Simt], StageResult[Samples]]
 ALGORITHMS: dict[str, tuple[str, Draw]] = {  # what: pipeline of its mix, and how it is drawn
     "stamps 1x1": ("stamps", lambda p, s, simt: stamps(p, s, stamp_shape(1, "box"), simt)),
     "stamps 8x8": ("stamps", lambda p, s, simt: stamps(p, s, stamp_shape(8, "box"), simt)),
@@ -101,7 +101,7 @@ def _timed(polygons: Micropolygons, area: float, name: str, machine_name: str) -
     """One algorithm on one machine: time, bound, STE and SIMD efficiency."""
     machine = load_machine(machine_name)
     pipeline, draw = ALGORITHMS[name]
-    work = draw(polygons, new_samples(WIDTH, HEIGHT, sample_positions(1)), machine.simt)
+    work = draw(polygons, new_samples(WIDTH, HEIGHT, sample_positions(1)), machine.simt).works[0]
     launch = load_mix(pipeline, machine.compute_capability).launch(work, machine.sm.warp_size)
     timing = price([launch], machine)[0]
     counts = work.counts()

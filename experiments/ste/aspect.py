@@ -78,7 +78,7 @@ def _measure(area: float, aspect: int) -> dict[str, float]:
         count = count_tests(polygons, PIXELS, PIXELS, offsets, stamp_shape(1, "box"))
         plain, covered = plain + count.tests, covered + count.hits
         for row, lanes in enumerate((1, Simt().warp)):
-            work = bit_mask(polygons, new_samples(PIXELS, PIXELS, offsets), "plain", lanes, Simt())
+            work = bit_mask(polygons, new_samples(PIXELS, PIXELS, offsets), "plain", lanes, Simt()).works[0]
             masked[row] += work.total(BitMaskEvent.SAMPLE_TESTS), work.total(BitMaskEvent.SAMPLE_HITS)
     ste = covered / plain
     in_sequence, in_flight = masked[:, 1] / masked[:, 0]

@@ -90,7 +90,7 @@ def _measure(model: Model, level: int, height: int) -> dict[str, Any]:
 
 def _masked(polygons: Micropolygons, width: int, height: int, kind: Any) -> tuple[Samples, int, int]:
     samples = new_samples(width, height, sample_positions(1))
-    work = bit_mask(polygons, samples, kind, 1, Simt())
+    work = bit_mask(polygons, samples, kind, 1, Simt()).works[0]
     return samples, work.total(BitMaskEvent.SAMPLE_TESTS), work.total(BitMaskEvent.SAMPLE_HITS)
 
 

@@ -99,7 +99,7 @@ def _moving(way: float, radius: float) -> MovingMicropolygons:
 
 
 def _draw(name: str, moving: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> Work:
-    return (motion_interval if name == "interval" else motion_interleaved)(moving, pattern, samples)
+    return (motion_interval if name == "interval" else motion_interleaved)(moving, pattern, samples).works[0]
 
 
 def _measure(way: float, radius: float) -> list[dict[str, Any]]:

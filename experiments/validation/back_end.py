@@ -65,8 +65,8 @@ def grids_of(camera: dict[str, Any], simt: Simt, *, shuffle: bool) -> Grids:
     if patches is None:
         raise TilestampError(f"{camera['model']} has no patches")
     view = (camera["model_to_clip"], camera["width"], camera["height"])
-    subpatches, _ = bound_and_split(patches.points, *view, camera["bound_pixels"], simt, counting=False)
-    grids, _ = dice(patches.points, subpatches, *view, simt, counting=False)
+    subpatches, _, _ = bound_and_split(patches.points, *view, camera["bound_pixels"], simt, counting=False)
+    grids, _, _ = dice(patches.points, subpatches, *view, simt, counting=False)
     if not shuffle:
         return grids
     order = shuffled(len(grids.boxes))
@@ -78,17 +78,17 @@ def back_end(grids: Grids, camera: dict[str, Any], simt: Simt, *, padded: bool =
     width, height = camera["width"], camera["height"]
     for tile in TILE_SIZES:
         tiles = screen_tiles(width, height, tile, camera["bound_pixels"])
-        count, idx, added = bucket_count(grids.boxes, tiles, simt)
-        start, _ = bucket_scan(count, simt, counting=False)
-        lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt)
+        (count, idx), added, _ = bucket_count(grids.boxes, tiles, simt)
+        start, _, _ = bucket_scan(count, simt, counting=False)
+        lists, written, _ = bucket_write(grids.boxes, tiles, count, start, idx, simt)
         yield Case(tile, 0, "k_addr", added[1])
         for name, (padding, aggregate) in PADDED.items() if padded and tile >= camera["bound_pixels"] else ():
-            _, _, spread = bucket_count(grids.boxes, tiles, simt, padding=padding, aggregate=aggregate)
+            (_, _), spread, _ = bucket_count(grids.boxes, tiles, simt, padding=padding, aggregate=aggregate)
             yield Case(tile, 0, name, spread[1])
         yield Case(tile, 0, "k_write", written[0])
         for spp in (1, 4):
             for box in (True, False) if tile == NO_BOX_TILE else (True,):
                 drawn = tile_raster(
                     grids.vertices, count, start, lists, tiles, width, height, simt, spp=spp, box_tests=box
-                )[3]
+                ).works
                 yield Case(tile, spp, "k_raster" if box else "k_raster_nobox", drawn[0])

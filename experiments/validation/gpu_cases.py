@@ -84,7 +84,7 @@ def _teapot_grids(simt: Simt) -> Grids:
     scene = load_scene(SCENE)
     assert scene.patches is not None  # noqa: S101 - the teapot has
     view = (read_camera("default", scene).matrix(WIDTH, HEIGHT), WIDTH, HEIGHT)
-    subpatches, _ = bound_and_split(scene.patches.points, *view, BOUND, simt, counting=False)
+    subpatches, _, _ = bound_and_split(scene.patches.points, *view, BOUND, simt, counting=False)
     return dice(scene.patches.points, subpatches, *view, simt, counting=False)[0]
 
 
@@ -92,9 +92,9 @@ def _back_end(grids: Grids, tile: int, simt: Simt) -> Iterator[GpuCase]:
     """Address calculation, bucket write and both rasters at one tile size."""
     cp = cupy()
     tiles = screen_tiles(WIDTH, HEIGHT, tile, BOUND)
-    count, idx, added = bucket_count(grids.boxes, tiles, simt)
-    start, _ = bucket_scan(count, simt, counting=False)
-    lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt)
+    (count, idx), added, _ = bucket_count(grids.boxes, tiles, simt)
+    start, _, _ = bucket_scan(count, simt, counting=False)
+    lists, written, _ = bucket_write(grids.boxes, tiles, count, start, idx, simt)
     shape = (np.int32(len(grids.boxes)), np.int32(tiles.columns), np.int32(tiles.rows))
     boxes, vertices, starts, counts = map(cp.asarray, (grids.boxes, grids.vertices, start, count))
     counted, placed = cp.zeros(tiles.total, cp.uint32), cp.zeros((len(grids.boxes), 4), cp.uint32)
@@ -108,7 +108,7 @@ def _back_end(grids: Grids, tile: int, simt: Simt) -> Iterator[GpuCase]:
     write = _launcher(code, "bucket_write", grid, BLOCK, boxes, *shape, starts, places, listed)
     yield GpuCase(tile, 0, "k_write", "micropolygon", written[0], write, None, partial(_unlike, listed, lists))
     for spp in (1, 4):
-        image, _, _, drawn = tile_raster(grids.vertices, count, start, lists, tiles, WIDTH, HEIGHT, simt, spp=spp)
+        (image, _, _), drawn, _ = tile_raster(grids.vertices, count, start, lists, tiles, WIDTH, HEIGHT, simt, spp=spp)
         yield _raster_case(tiles, tile, spp, drawn[0], image, (vertices, starts, counts, cp.asarray(lists)))
 
 
@@ -144,7 +144,7 @@ def _triangles(simt: Simt) -> Iterator[GpuCase]:
         ids = (drawn.ids + 1).astype(np.uint32)
         unlike = partial(_unlike_low, frame, ids, clipped)
         yield GpuCase(0, 0, kernel, "freepipe", work, start, partial(frame.fill, 2**64 - 1), unlike)
-    setup, work, _ = triangle_setup(positions, mesh.triangles, WIDTH, HEIGHT, simt, release="nvdiffrast")
+    setup, (work,), _ = triangle_setup(positions, mesh.triangles, WIDTH, HEIGHT, simt, release="nvdiffrast")
     kept, headers, planes = cp.zeros(n, cp.uint8), cp.zeros((n, 4), cp.uint32), cp.zeros((n, 4), cp.uint32)
     start = _launcher(_triangle_code, "triangle_setup", work.grid, work.block, *inputs, kept, headers, planes, clipped)
 

@@ -22,6 +22,7 @@ from tilestamp.models.errors import MissingInputError, TilestampError
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import traffic
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes import load_scene
@@ -199,8 +200,8 @@ def _draw(pipeline: str, source: Path, width: int, height: int, machine: Machine
     """Works of a mesh in clip space."""
     import numpy as np
 
-    chosen = pipeline_options(pipeline, options)
-    frame = load_pipeline(pipeline)(load_scene(str(source)), np.eye(4), width, height, machine.simt, chosen)
+    scene, chosen = load_scene(str(source)), pipeline_options(pipeline, options)
+    frame = load_pipeline(pipeline)(scene, np.eye(4), width, height, machine.simt, chosen, Executor())
     return [work for work in frame.works if isinstance(work, Work)]
 
 

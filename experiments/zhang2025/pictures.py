@@ -1,6 +1,7 @@
 """Features off and on, side by side: perspective, filtering, ambient occlusion, transparency, the write race."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes.camera import LookAt
@@ -52,8 +54,8 @@ def run(progress: Callable[[str], None]) -> Result:
     for name, (pipeline, machine, off, on) in PAIRS.items():
         progress(name)
         simt = load_machine(machine).simt
-        options = (pipeline_options(pipeline, given) for given in (off, on))
-        frames = [load_pipeline(pipeline)(scene, matrix, SIZE, SIZE, simt, chosen) for chosen in options]
+        draw = partial(load_pipeline(pipeline), scene, matrix, SIZE, SIZE, simt)
+        frames = [draw(pipeline_options(pipeline, given), Executor()) for given in (off, on)]
         cells += _difference(name, *frames)
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]

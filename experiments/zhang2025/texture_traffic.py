@@ -9,6 +9,7 @@ from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.work import Work
@@ -43,7 +44,7 @@ def wall(minification: float, degrees: int) -> Scene:
 def shader(scene: Scene, simt: Simt, layout: str, texture_filter: str) -> Work:
     """Draw the wall and give the pixel shader's work."""
     options = BinnedOptions(texture_filter=texture_filter, **LAYOUTS[layout])  # type: ignore[arg-type]  # checked there
-    frame = binned(scene, np.eye(4), SIZE, SIZE, simt, options)
+    frame = binned(scene, np.eye(4), SIZE, SIZE, simt, options, Executor())
     return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
 
 

@@ -1,10 +1,8 @@
 """One module for each published system; it reads like its overview figure.
 
 A pipeline is a function that bears its module's name, and a struct of its options beside it:
-``pipeline(scene, matrix, width, height, simt, options) -> Frame``.
-
-Two keywords are no options: ``sample``, a ``Sampler`` by which expensive stages run on part of their units, and
-``picture``, which says whether one is wanted. ``simulate`` hands them to the pipelines that have them.
+``pipeline(scene, matrix, width, height, simt, options, execute) -> Frame``. It hands every stage to its executor
+(``simulator.executor``), which runs all of it or part of it, counts or not, and keeps what the stages did.
 """
 
 import inspect
@@ -55,8 +53,3 @@ def pipeline_options(name: str, given: dict[str, Any]) -> Options:
         An option that the pipeline has not, or a value that it does not take.
     """
     return make_options(options_type(name), given, f"the pipeline {name}")
-
-
-def can_take(name: str, keyword: str) -> bool:
-    """Whether the pipeline ``name`` can be handed ``sample`` (run part of the units) or ``picture`` (draw none)."""
-    return keyword in inspect.signature(load_pipeline(name)).parameters

@@ -5,23 +5,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.stages.eisenacher2010.dice import Grids
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, GRID_SIDE, QUADS
 from tilestamp.simulator.stages.hardware import hardware_grids
-from tilestamp.simulator.work import Work
 
 
-def draw_grids(grids: Grids, width: int, height: int, works: list[Work], facts: dict[str, Any]) -> Frame:
+def draw_grids(execute: Executor, grids: Grids, width: int, height: int, facts: dict[str, Any]) -> Frame:
     """Draw diced grids by fixed function; a quad takes the colour of its first vertex, which is a pixel away at most.
 
     Parameters
     ----------
+    execute : Executor
     grids : Grids
     width, height : int
         Pixels.
-    works : list of Work
-        Of the stages before.
     facts : dict
         Of the stages before.
     """
@@ -30,11 +29,10 @@ def draw_grids(grids: Grids, width: int, height: int, works: list[Work], facts: 
     clip[..., 0] = screen[..., 0] * np.float32(2 / width) - np.float32(1)
     clip[..., 1] = np.float32(1) - screen[..., 1] * np.float32(2 / height)
     clip[..., 2] = screen[..., 2]
-    drawn, work, found = hardware_grids(clip, width, height)
+    drawn, _, found = execute(hardware_grids, clip, width, height)
     ids = drawn.ids[::-1]  # its row 0 is the bottom row
     image = _colors(grids.vertices, ids)
-    launched: list[Any] = [*works, work]  # the last is fixed-function work
-    return Frame(image, drawn.depth[::-1], launched, facts={**facts, **found})
+    return Frame(image, drawn.depth[::-1], execute.works, facts={**facts, **found})
 
 
 def _colors(vertices: NDArray[np.float32], ids: NDArray[np.int32]) -> NDArray[np.uint8]:

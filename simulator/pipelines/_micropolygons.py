@@ -1,5 +1,6 @@
 """What the micropolygon pipelines of 2009 and 2012 share: options of their input, and their picture as a frame."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, picture, visible
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import FixedFunctionWork, Work
 
 REMARKS = {
     "dropped_polygons": "{:,} micropolygons across the eye's plane, or not finite, are not drawn",
@@ -31,7 +32,9 @@ class MicropolygonInput(Options, frozen=True, kw_only=True):
     """Split micropolygons into triangles."""
 
 
-def frame_of(samples: Samples, polygons: Micropolygons, works: list[Work], **facts: Any) -> Frame:
+def frame_of(
+    samples: Samples, polygons: Micropolygons, works: Sequence[Work | FixedFunctionWork], **facts: Any
+) -> Frame:
     """Gather a frame: the picture, the nearest depth of each pixel's first sample, ids of patches or triangles."""
     depth = samples.depth.reshape(samples.height, samples.width, -1)[:, :, 0]
     found = {"micropolygons": len(polygons.patch), "dropped_polygons": polygons.dropped} | facts

@@ -5,6 +5,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of
 from tilestamp.simulator.scenes.scene import Scene
@@ -23,16 +24,22 @@ class AcrossPolygonsOptions(MicropolygonInput, frozen=True, kw_only=True):
 
 
 def across_polygons(
-    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: AcrossPolygonsOptions
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    options: AcrossPolygonsOptions,
+    execute: Executor,
 ) -> Frame:
     """Micropolygons in parallel: a lane each, warps as long as their longest (Fatahalian et al. 2009).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))
     polygons = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
-    work = walk_boxes(polygons, samples, options.packing, simt)
-    return frame_of(samples, polygons, [work])
+    execute(walk_boxes, polygons, samples, options.packing, simt)
+    return frame_of(samples, polygons, execute.works)

@@ -7,6 +7,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
@@ -61,12 +62,14 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """As the original, leave out the rows beyond whole blocks of 32 (the top 24 of 1080), and a frame's fragment 0."""
 
 
-def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BinnedOptions) -> Frame:
+def binned(
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BinnedOptions, execute: Executor
+) -> Frame:
     """Textured triangles through bins, tiles, quads and fragment lists (Zhang 2025).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``; at most 2048 pixels on a side.
     """
     optimized = options.optimized
@@ -78,24 +81,32 @@ def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Si
     )
     opaque = options.order == "api"
 
-    vertices, shading = vertex_fetch_and_shading(mesh, matrix, simt)
-    slots, assembly = primitive_assembly(mesh, vertices, width, height, simt, culling=options.cull_backfaces)
-    primitives, compaction = primitive_compaction(slots, len(mesh.triangles), simt)
-    data, setup = triangle_setup(primitives, simt, triangles=len(mesh.triangles))
-    bins, binning = primitive_binning(data.boxes, width, height, simt, triangles=len(mesh.triangles))
-    tiles, coarse = coarse_rasterizer(data, bins, width, height, simt, hi_z=opaque, unrolled=optimized)
-    fragments, fine = fine_rasterizer(
-        data, tiles, width, height, simt, early_z=opaque, optimized=optimized, whole_blocks=options.original_faults
-    )
-    stream, shader = pixel_shader(
-        data, tiles, fragments, chains, mesh.texture_ids, simt,
+    vertices = execute(vertex_fetch_and_shading, mesh, matrix, simt).outputs
+    slots = execute(primitive_assembly, mesh, vertices, width, height, simt, culling=options.cull_backfaces).outputs
+    primitives = execute(primitive_compaction, slots, len(mesh.triangles), simt).outputs
+    data = execute(triangle_setup, primitives, simt, triangles=len(mesh.triangles)).outputs
+    bins = execute(primitive_binning, data.boxes, width, height, simt, triangles=len(mesh.triangles)).outputs
+    tiles = execute(coarse_rasterizer, data, bins, width, height, simt, hi_z=opaque, unrolled=optimized).outputs
+    fragments = execute(
+        fine_rasterizer,
+        data,
+        tiles,
+        width,
+        height,
+        simt,
+        early_z=opaque,
+        optimized=optimized,
+        whole_blocks=options.original_faults,
+    ).outputs
+    stream = execute(
+        pixel_shader, data, tiles, fragments, chains, mesh.texture_ids, simt,
         texture_filter=options.texture_filter, opacity=options.opacity, optimized=optimized,
-    )  # fmt: skip
-    target, depth, winners, resolve = rop(
-        data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
+    ).outputs  # fmt: skip
+    pixels, (resolve,), _ = execute(
+        rop, data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
         limit=options.fragments_a_pixel, optimized=optimized, zero_ends=options.original_faults,
     )  # fmt: skip
-    image, streaming = streaming_to_frame_buffer(target, simt, optimized=optimized)
+    image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
 
     facts = {
         "primitives after culling": len(data.ids),
@@ -106,9 +117,9 @@ def binned(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Si
     }
     return Frame(
         image,
-        depth[::-1],
-        [shading, assembly, compaction, setup, binning, coarse, fine, shader, resolve, streaming],
-        triangle_ids=np.where(winners >= 0, mesh.ids[winners], -1).astype(np.int32)[::-1],
+        pixels.depth[::-1],
+        execute.works,
+        triangle_ids=np.where(pixels.winners >= 0, mesh.ids[pixels.winners], -1).astype(np.int32)[::-1],
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
         facts=facts,
         warnings=remarks(REMARKS, facts),

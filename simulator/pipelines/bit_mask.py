@@ -7,6 +7,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of, wrong_pixels
 from tilestamp.simulator.scenes.scene import Scene
@@ -29,12 +30,14 @@ class BitMaskOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Consecutive triangles of a mesh that share a mask."""
 
 
-def bit_mask(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BitMaskOptions) -> Frame:
+def bit_mask(
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BitMaskOptions, execute: Executor
+) -> Frame:
     """Micropolygons under a bit mask a patch: samples already hit are filtered (Yao et al.).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     offsets = sample_positions(options.spp, options.positions)
@@ -42,9 +45,9 @@ def bit_mask(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: 
     made = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
     masked = made if scene.patches is not None else grouped(made, options.group)
     lanes = simt.warp if options.lanes is None else options.lanes
-    work = filter_samples(masked, samples, options.mask, lanes, simt)
+    execute(filter_samples, masked, samples, options.mask, lanes, simt)
     across_polygons(made, exact, "in-order", simt)  # the picture to compare with: no part of the work
     wrong = wrong_pixels(samples, exact)
-    frame = frame_of(samples, made, [work], wrong_pixels=int(wrong.sum()))
+    frame = frame_of(samples, made, execute.works, wrong_pixels=int(wrong.sum()))
     frame.maps["wrong"] = wrong.astype(np.int32)
     return frame

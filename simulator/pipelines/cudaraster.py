@@ -4,7 +4,7 @@ Triangle setup culls and prepares, bin raster queues triangles by 128x128 pixels
 raster draws each 8x8 tile in shared memory.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._cudaraster_facts import (
@@ -26,8 +27,6 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
     setup_counters,
 )
 from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
-from tilestamp.simulator.pipelines._cudaraster_sampled import sampled_draw
-from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
@@ -42,7 +41,6 @@ from tilestamp.simulator.stages.laine2011.triangle_setup import (
     triangle_setup,
 )
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
-from tilestamp.simulator.work import Work
 
 
 class CudarasterOptions(Options, frozen=True, kw_only=True):
@@ -68,8 +66,6 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     first_frame: bool = False
     """Queues have their first size: a draw that overflows one is repeated, and what failed is priced too. Without it
     they have grown in a frame before, as where frames are timed."""
-    counting: bool = True
-    """Count what the machine does; without it there is a picture and no time."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,6 +82,7 @@ class _State:
     """What draws of one frame hand on: capacities, pixels and sums."""
 
     options: CudarasterOptions
+    execute: Executor
     size: tuple[int, int]
     simt: Simt
     colors: NDArray[np.float32] | None
@@ -93,7 +90,6 @@ class _State:
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
     buffers: FrameBuffers | None = None
-    works: list[Work] = field(default_factory=list)
     counters: Counters = field(default_factory=dict)
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
 
@@ -105,9 +101,7 @@ def cudaraster(
     height: int,
     simt: Simt,
     options: CudarasterOptions,
-    *,
-    sample: Sampler | None = None,
-    picture: bool = True,
+    execute: Executor,
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 
@@ -122,10 +116,8 @@ def cudaraster(
     simt : Simt
         The machine's shape.
     options : CudarasterOptions
-    sample : Sampler, optional
-        Run part of the units; no picture comes back. Several batches share their pixels: then all units run.
-    picture : bool
-        Without it vertices have no colours, and no picture comes back.
+    execute : Executor
+        Several batches share their pixels: then all units run.
 
     Returns
     -------
@@ -140,17 +132,15 @@ def cudaraster(
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    if sample is not None and options.batches == 1 and sample.pays(len(mesh.triangles)):
-        return sampled_draw(sample, positions, mesh.triangles, width, height, simt, options)
-    colors = None if options.mode == "depth-only" or not picture else vertex_colors(mesh, matrix)
-    state = _State(options, (width, height), simt, colors)
+    colors = None if options.mode == "depth-only" or not execute.picture else vertex_colors(mesh, matrix)
+    state = _State(options, execute, (width, height), simt, colors)
     for first, last in _batch_bounds(len(mesh.triangles), options.batches):
         _draw(state, positions, mesh.triangles[first:last], first)
-    if options.copy_parameters:
-        state.works = [with_parameter_copy(work) if work.kernel in COPYING else work for work in state.works]
+    copied = COPYING if options.copy_parameters else ()
+    works = [with_parameter_copy(work) if work.kernel in copied else work for work in execute.works]
     facts = frame_facts(state.counters, state.needed, options.release, state.retries)
-    if not picture:
-        return Frame.numbers(state.works, facts, remarks(REMARKS, facts))
+    if not execute.picture:
+        return Frame.numbers(works, facts, remarks(REMARKS, facts))
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
     shown = shown_sample(options.msaa)
     ids = state.buffers.ids[shown, :height, :width][::-1]
@@ -158,7 +148,7 @@ def cudaraster(
     return Frame(
         image,
         state.buffers.depth[shown, :height, :width][::-1],
-        state.works,
+        works,
         ids,
         maps=state.maps,
         facts=facts,
@@ -173,45 +163,37 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
 
     A stage that overflows is executed to its end all the same; the kernels behind it return at once.
     """
-    width, height = state.size
-    options = state.options
-    release, samples, mode, counting = options.release, options.msaa, options.mode, options.counting
-    depth, _, _, interpolate = MODES[mode]
-    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": release}
-    shape["counting"] = counting
+    options, execute, (width, height) = state.options, state.execute, state.size
+    depth, _, _, interpolate = MODES[options.mode]
+    shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": options.release}
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
     while True:
-        setup, setup_work, facts = triangle_setup(
-            positions, triangles, **shape, samples=samples, cull_backfaces=options.cull_backfaces,
-            guard_band=options.guard_band, depth=depth, interpolate=interpolate,
+        setup, prepared, facts = execute(
+            triangle_setup, positions, triangles, **shape, samples=options.msaa, depth=depth, interpolate=interpolate,
+            cull_backfaces=options.cull_backfaces, guard_band=options.guard_band, variant=options.mode,
             capacity=state.capacity["numSubtris"] if options.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
-        setup_work = replace(setup_work, variant=mode)
-        state.works.append(setup_work)
         if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
             continue
-        queues, bin_work, bin_facts = bins.bin_raster(setup, **shape)
-        state.works.append(bin_work)
+        queues, _, bin_facts = execute(bins.bin_raster, setup, **shape)
         if _grow(state, "numBinSegs", bin_facts["num_bin_segments"], 256):
             continue
-        lists, tile_work, tile_facts = tiles.coarse_raster(queues, setup, deferred_clear=clear, **shape)
-        state.works.append(tile_work)
+        lists, _, tile_facts = execute(tiles.coarse_raster, queues, setup, deferred_clear=clear, **shape)
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
-    state.buffers, fine_work = fine_raster(
-        setup, lists.starts, lists.entries, lists.active, **shape, samples=samples, mode=mode,
-        colors=state.colors, buffers=state.buffers,
+    buffers, drawn, _ = (execute.last if options.batches == 1 else execute)(
+        fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=options.msaa,
+        mode=options.mode, colors=state.colors, buffers=state.buffers,
     )  # fmt: skip
-    variant = "" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa"
-    state.works.append(replace(fine_work, variant=variant))
-    if counting:
-        drawn = int(np.count_nonzero(setup.subtriangles))
-        counters = setup_counters(setup_work, fine_work, drawn, len(triangles)) | bin_facts["counters"]
-        counters |= tile_facts["counters"] | fine_counters(fine_work, depth=depth, msaa=samples)
+    state.buffers = buffers
+    if execute.counting:
+        visible = int(np.count_nonzero(setup.subtriangles))
+        counters = setup_counters(prepared[0], drawn[0], visible, len(triangles)) | bin_facts["counters"]
+        counters |= tile_facts["counters"] | fine_counters(drawn[0], depth=depth, msaa=options.msaa)
         state.counters = add_counters(state.counters, counters)
-    tile_maps(state.maps, lists, fine_work if counting else None)
+    tile_maps(state.maps, lists, drawn[0] if execute.counting else None)
 
 
 def _initial_capacity(state: _State, triangles: int) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
@@ -34,8 +35,6 @@ class FreepipeOptions(Options, frozen=True, kw_only=True):
     """Read the pixel before the atomic (packing 64)."""
     block: Annotated[int, Meta(ge=32, le=1024, multiple_of=32)] = BLOCK
     """Threads in a block."""
-    counting: bool = True
-    """Count what the machine does; without it there is a picture and no time."""
 
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """One kernel, of ``block`` threads."""
@@ -48,13 +47,19 @@ class FreepipeOptions(Options, frozen=True, kw_only=True):
 
 
 def freepipe(
-    scene: Scene, matrix: NDArray[np.floating], width: int, height: int, simt: Simt, options: FreepipeOptions
+    scene: Scene,
+    matrix: NDArray[np.floating],
+    width: int,
+    height: int,
+    simt: Simt,
+    options: FreepipeOptions,
+    execute: Executor,
 ) -> Frame:
     """FreePipe: one thread a triangle, atomics on the frame buffer (Liu et al. 2010).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
 
     Returns
@@ -66,9 +71,9 @@ def freepipe(
     positions = clip_positions(mesh, matrix)
     colors = vertex_colors(mesh, matrix)
     flat = _flat_colors(colors, mesh.triangles) if options.packing == "32" else None
-    frame, works, facts = draw(
-        positions, mesh.triangles, width, height, simt,
-        packing=options.packing, early=options.early, block=options.block, colors=flat, counting=options.counting,
+    frame, _, facts = execute(
+        draw, positions, mesh.triangles, width, height, simt,
+        packing=options.packing, early=options.early, block=options.block, colors=flat,
     )  # fmt: skip
     if frame.colors is None:
         image = pixel_colors(frame.ids, positions, mesh.triangles, colors)
@@ -77,7 +82,7 @@ def freepipe(
         image = (channels * (frame.ids >= 0)[..., None]).astype(np.uint8)
     maps = {"tied_pixels": frame.tied[::-1], "mixed_pixels": frame.mixed[::-1]}
     said = remarks(REMARKS, facts)
-    return Frame(image[::-1], frame.depth[::-1], list(works), frame.ids[::-1], maps, facts, said)
+    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], maps, dict(facts), said)
 
 
 def _flat_colors(colors: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.uint32]:

@@ -1,12 +1,13 @@
 """The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
@@ -37,21 +38,21 @@ def hardware(
     height: int,
     simt: Simt,  # noqa: ARG001 - every pipeline is called alike; fixed function has no warps
     options: HardwareOptions,
+    execute: Executor,
 ) -> Frame:
     """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate.
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    frame, work, facts = draw(
-        positions, mesh.triangles, width, height,
+    frame, _, facts = execute(
+        draw, positions, mesh.triangles, width, height,
         cull_backfaces=options.cull_backfaces, bits=options.bits, depth_format=options.depth_format,
         guard_band=options.guard_band,
     )  # fmt: skip
-    works: list[Any] = [work]
     image = pixel_colors(frame.ids, positions, mesh.triangles, vertex_colors(mesh, matrix))
-    return Frame(image[::-1], frame.depth[::-1], works, frame.ids[::-1], facts=facts)
+    return Frame(image[::-1], frame.depth[::-1], execute.works, frame.ids[::-1], facts=dict(facts))

@@ -14,13 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
-from tilestamp.simulator.pipelines._micropolygon_sampled import sampled_back_end
-from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.eisenacher2010 import snap_edges as snapping
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
     MAX_DEPTH,
     BoundRule,
@@ -31,6 +29,7 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import snap_edges
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
@@ -62,13 +61,11 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Halvings that every sub-patch takes; as many as the deepest needs leave no cracks."""
     snap_edges: bool = False
     """Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks (not
-    in the paper). Its look-ups are counted and not priced. A sampled run then samples bound and split alone."""
+    in the paper). Its look-ups are counted and not priced."""
     hybrid: bool = False
     """Give the diced grids to the fixed-function rasterizer."""
     texture: NDArray[np.uint8] | None = None
     """Laid over each patch: (H, W, 3 or 4) bytes."""
-    counting: bool = True
-    """Count what the machine does; without it there is a picture and no time."""
 
     def launches(self, simt: Simt) -> list[Work]:
         """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
@@ -83,9 +80,7 @@ def micropolygon(
     height: int,
     simt: Simt,
     options: MicropolygonOptions,
-    *,
-    sample: Sampler | None = None,
-    picture: bool = True,
+    execute: Executor,
 ) -> Frame:
     """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 
@@ -99,10 +94,7 @@ def micropolygon(
         Pixels.
     simt : Simt
     options : MicropolygonOptions
-    sample : Sampler, optional
-        Run part of the units; no picture comes back.
-    picture : bool
-        Without it vertices are not shaded, and no picture comes back.
+    execute : Executor
 
     Returns
     -------
@@ -116,45 +108,32 @@ def micropolygon(
     """
     if scene.patches is None:
         raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
-    points, texture, counting = scene.patches.points, options.texture, options.counting
+    points, texture = scene.patches.points, options.texture
+    view: dict[str, Any] = {"matrix": matrix, "width": width, "height": height, "simt": simt}
     tiles = screen_tiles(width, height, options.tile, options.bound)
-    boxes: list[NDArray[np.float32]] | None = [] if sample and not options.hybrid and not options.snap_edges else None
-    subpatches, split = bound_and_split(
-        points, matrix, width, height, options.bound, simt, bound_rule=options.bound_rule, counting=counting,
-        near=options.near, min_depth=options.min_depth, wanted=boxes, sample=sample,
-    )  # fmt: skip
-    raster: dict[str, Any] = {"spp": options.spp, "box_tests": options.box_tests, "edges": options.edges}
-    if sample and boxes and sample.pays(len(subpatches.patch)):
-        view = matrix, width, height, simt
-        rest = sampled_back_end(
-            sample, points, subpatches, boxes[0], view, tiles, textured=texture is not None, raster=raster
-        )
-        facts = _facts(subpatches, rest[-1].total(TileRasterEvent.GRIDS))
-        return Frame.numbers([*split, *rest], facts, remarks(REMARKS, facts))
-    grids, diced = dice(
-        points, subpatches, matrix, width, height, simt, texture=texture, counting=counting, shaded=picture
-    )
+    subpatches = execute(
+        bound_and_split, points, **view, bound=options.bound, bound_rule=options.bound_rule, near=options.near,
+        min_depth=options.min_depth,
+    ).outputs  # fmt: skip
+    grids = execute(dice, points, subpatches, **view, texture=texture, shaded=execute.picture).outputs
     if options.snap_edges:
-        snapped = snapping.snap_edges(subpatches, grids, snapping.shared_edges(points))
-        grids = snapped.grids
-        if counting:
-            diced += snapping.snap_works(snapped, subpatches.patch, len(points), simt, textured=texture is not None)
+        grids = execute(snap_edges, points, subpatches, grids, simt, textured=texture is not None).outputs.grids
     if options.hybrid:
-        drawn_grids = draw_grids(grids, width, height, [*split, *diced], _facts(subpatches, 0))
-        return replace(drawn_grids, warnings=remarks(REMARKS, drawn_grids.facts))
-    count, idx, counted = bucket_count(grids.boxes, tiles, simt, counting=counting)
-    start, scanned = bucket_scan(count, simt, counting=counting)
-    lists, written = bucket_write(grids.boxes, tiles, count, start, idx, simt, counting=counting)
-    image, depth, overdraw, drawn = tile_raster(
-        grids.vertices, count, start, lists, tiles, width, height, simt, **raster, counting=counting
-    )
-    works = [*split, *diced, *counted, *scanned, *written, *drawn]
-    maps = {} if overdraw is None else _maps(drawn[0], count, overdraw, tiles)
+        frame = draw_grids(execute, grids, width, height, _facts(subpatches, 0))
+        return replace(frame, warnings=remarks(REMARKS, frame.facts))
+    count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
+    start = execute(bucket_scan, count, simt).outputs
+    lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
+    pixels, drawn, _ = execute.last(
+        tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
+        spp=options.spp, box_tests=options.box_tests, edges=options.edges,
+    )  # fmt: skip
     facts = _facts(subpatches, len(lists))
-    if not picture:
-        return Frame.numbers(works, facts, remarks(REMARKS, facts))
-    warnings = remarks(REMARKS, facts)
-    return Frame(image, depth, works, maps=maps, facts=facts, warnings=warnings, tile=options.tile)
+    said = remarks(REMARKS, facts)
+    if not execute.picture:
+        return Frame.numbers(execute.works, facts, said)
+    maps = {} if pixels.overdraw is None else _maps(drawn[0], count, pixels.overdraw, tiles)
+    return Frame(pixels.image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=options.tile)
 
 
 def _maps(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines.tiled import not_drawn
@@ -17,7 +18,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
-from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, shaded_primitives
 
 
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
@@ -38,43 +39,48 @@ class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
 
 
 def per_primitive(
-    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: PerPrimitiveOptions
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    options: PerPrimitiveOptions,
+    execute: Executor,
 ) -> Frame:
     """Textured triangles by one thread each, with its write race (Ru 2016).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     mesh = geometry(scene)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts, samples=options.samples)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
-    works = [work for part in zip(shading, assembly, strict=True) for work in part]
-    works += clear(width, height, 0, simt)
-    meant, raced, raster = per_primitive_raster(
-        vertices.screen, mesh.triangles, drawable, width, height, simt, culling=options.cull_backfaces,
-        textured=bool((mesh.texture_ids >= 0).any()), samples=options.samples,
-    )  # fmt: skip
-    works.append(raster)
+    vertices, drawable = execute(
+        shaded_primitives, mesh, matrix, width, height, simt, parts, samples=options.samples
+    ).outputs
+    execute(clear, width, height, 0, simt)
+    meant, raced = execute(
+        per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt,
+        culling=options.cull_backfaces, textured=bool((mesh.texture_ids >= 0).any()),
+        samples=options.samples,
+    ).outputs  # fmt: skip
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     wrong = raced.triangles != meant.triangles
     visible = Visible(raced.triangles, meant.depth) if options.race else meant
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt, samples=options.samples)
-        works += occlusion
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt, samples=options.samples).outputs
     waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
-    image, finish = fragment_shading(
-        mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
-    )
+    image = execute(
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
+    ).outputs
     return Frame(
         image,
         meant.depth,
-        works + finish,
+        execute.works,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
         maps={"race": wrong.astype(np.int64), "pixels wrong by the race": wrong.astype(np.int64)},
         facts={

@@ -6,6 +6,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of
 from tilestamp.simulator.scenes.scene import Scene
@@ -30,16 +31,18 @@ class StampsOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Side of the coarse stamp that culls or accepts first, 0 for one level."""
 
 
-def stamps(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: StampsOptions) -> Frame:
+def stamps(
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: StampsOptions, execute: Executor
+) -> Frame:
     """Micropolygons by stamps: n x n pixels tested at once, one level or two (after Fatahalian et al. 2009).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     shape = stamp_shape(options.stamp, options.touch, options.coarse)
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))
     polygons = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
-    work = draw_stamps(polygons, samples, shape, simt)
-    return frame_of(samples, polygons, [work])
+    execute(draw_stamps, polygons, samples, shape, simt)
+    return frame_of(samples, polygons, execute.works)

@@ -7,6 +7,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.scene import Scene
@@ -17,7 +18,7 @@ from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.fragment_shading import Filter, fragment_shading, interpolate
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
 from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, raster_work, tiled_raster
-from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, primitive_assembly, vertex_shading
+from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space, shaded_primitives
 from tilestamp.simulator.work import Work
 
 
@@ -44,12 +45,14 @@ class TiledOptions(Options, frozen=True, kw_only=True):
         return [raster_work(np.zeros((0, len(TiledRasterEvent)), np.int64), self.tile)]
 
 
-def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: TiledOptions) -> Frame:
+def tiled(
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: TiledOptions, execute: Executor
+) -> Frame:
     """Textured triangles by tile lists, a thread a pixel (Ru 2016).
 
     Parameters
     ----------
-    scene, matrix, width, height, simt, options
+    scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
     tile = options.tile
@@ -57,11 +60,12 @@ def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Sim
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
     parts = draws(scene, mesh)
-    vertices, shading = vertex_shading(mesh, matrix, width, height, simt, parts, samples=options.samples)
-    drawable, assembly = primitive_assembly(mesh, vertices, simt, parts)
-    works = [work for part in zip(shading, assembly, strict=True) for work in part]
-    works += clear(width, height, tiles, simt)
-    lists, listing, lost = tile_lists(
+    vertices, drawable = execute(
+        shaded_primitives, mesh, matrix, width, height, simt, parts, samples=options.samples
+    ).outputs
+    execute(clear, width, height, tiles, simt)
+    lists, _, listed = execute(
+        tile_lists,
         vertices.screen,
         mesh.triangles,
         drawable,
@@ -72,23 +76,23 @@ def tiled(scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Sim
         culling=options.cull_backfaces,
         capacity=options.capacity,
     )
-    visible, raster = tiled_raster(vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile)
-    works += [*listing, raster]
+    visible, (raster,), _ = execute(
+        tiled_raster, vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile
+    )
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)
     if options.ssao:
-        light, occlusion = ambient_occlusion(fragments, eye_space(matrix), simt, samples=options.samples)
-        works += occlusion
+        light = execute(ambient_occlusion, fragments, eye_space(matrix), simt, samples=options.samples).outputs
     waits = 2 * len(parts) + (5 if options.ssao else 3)  # shading and assembly of each part, raster, shading, copy
-    image, finish = fragment_shading(
-        mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
-    )
-    sizes = np.diff(lists.starts)
+    image = execute(
+        fragment_shading, mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
+    ).outputs
+    sizes, lost = np.diff(lists.starts), listed["lost"]
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0
     return Frame(
         image,
         visible.depth,
-        works + finish,
+        execute.works,
         triangle_ids=np.where(visible.triangles >= 0, mesh.ids[visible.triangles], -1).astype(np.int32),
         maps=_maps(sizes, raster, -(-height // tile)),
         facts={

@@ -20,6 +20,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.depth_format import DEPTHS, DepthFormat, stored_depth
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import SCREEN, Band, Pieces, make_pieces, start_edges
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
@@ -94,7 +95,7 @@ def hardware(
     bits: int = SUBPIXEL_BITS,
     depth_format: DepthFormat = "fixed32",
     guard_band: bool = True,
-) -> tuple[HardwareFrame, FixedFunctionWork, dict[str, Any]]:
+) -> StageResult[HardwareFrame]:
     """Draw triangles in input order, and count what each unit sees.
 
     Parameters
@@ -115,8 +116,8 @@ def hardware(
 
     Returns
     -------
-    frame : HardwareFrame
-    work : FixedFunctionWork
+    outputs : HardwareFrame
+    works : one FixedFunctionWork
         Items: ``vertices``, ``primitives`` in, ``culled`` (outside, turned away, without area or without a pixel
         centre in their box), ``quads`` touched, ``pixels`` shaded, ``z`` tests, ``samples`` written. Depth is tested
         before shading, so as many pixels are shaded as written.
@@ -138,7 +139,8 @@ def hardware(
     quads, tests, writes = (int(n) for n in counts.sum(axis=0))
     work, rasterized = _work(positions, triangles, pieces, cull_backfaces, quads, tests, writes, depths.bytes)
     facts = {"rasterized": rasterized, "quad_efficiency": tests / max(4 * quads, 1)}
-    return HardwareFrame(ids, depth), work, facts
+    works: Any = (work,)  # of fixed function
+    return StageResult(HardwareFrame(ids, depth), works, facts)
 
 
 def band_of(width: int, height: int) -> Band:
@@ -149,7 +151,7 @@ def band_of(width: int, height: int) -> Band:
 
 def hardware_grids(
     grids: NDArray[np.float32], width: int, height: int, *, bits: int = SUBPIXEL_BITS
-) -> tuple[HardwareFrame, FixedFunctionWork, dict[str, Any]]:
+) -> StageResult[HardwareFrame]:
     """Draw micropolygon grids, each quad as two triangles: the hybrid path.
 
     Parameters
@@ -163,8 +165,8 @@ def hardware_grids(
 
     Returns
     -------
-    frame, work, facts
-        As ``hardware``; ids count quads, in the order of grids, rows, columns.
+    StageResult
+        As of ``hardware``; ids count quads, in the order of grids, rows, columns.
     """
     count, rows, columns = grids.shape[:3]
     corner = np.arange(rows * columns).reshape(rows, columns)
@@ -172,8 +174,8 @@ def hardware_grids(
     pair = np.stack([np.stack([a, b, c], axis=-1), np.stack([c, b, d], axis=-1)], axis=2).reshape(-1, 3)
     triangles = (pair[None] + (np.arange(count) * rows * columns)[:, None, None]).reshape(-1, 3).astype(np.int32)
     positions = np.ascontiguousarray(grids.reshape(-1, 4))
-    frame, work, facts = hardware(positions, triangles, width, height, cull_backfaces=False, bits=bits)
-    return frame._replace(ids=np.where(frame.ids >= 0, frame.ids // 2, -1).astype(np.int32)), work, facts
+    frame, works, facts = hardware(positions, triangles, width, height, cull_backfaces=False, bits=bits)
+    return StageResult(frame._replace(ids=np.where(frame.ids >= 0, frame.ids // 2, -1).astype(np.int32)), works, facts)
 
 
 def _work(

@@ -3,6 +3,7 @@
 import pytest
 
 from tilestamp.models.machine import load_machine
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
 from tilestamp.simulator.pipelines.per_primitive import PerPrimitiveOptions, per_primitive
 from tilestamp.simulator.pipelines.tiled import TiledOptions, tiled
@@ -15,7 +16,7 @@ def timed(benchmark, pipeline, options, name, size, machine):
     scene = load_scene(name, kind="mesh")
     view = scene, scene.views["default"].matrix(*size), *size
     simt = load_machine(machine).simt
-    return benchmark.pedantic(pipeline, (*view, simt, options), rounds=5, warmup_rounds=1)
+    return benchmark.pedantic(lambda: pipeline(*view, simt, options, Executor()), rounds=5, warmup_rounds=1)
 
 
 def test_bunny_through_nine_stages(benchmark, shared):

@@ -7,6 +7,7 @@ import pytest
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.micropolygon import MicropolygonOptions, micropolygon
 from tilestamp.simulator.scenes import load_scene, read_camera
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
@@ -31,7 +32,7 @@ def scene_and_matrix():
 @cache
 def grids():
     scene, matrix = scene_and_matrix()
-    subpatches, _ = bound_and_split(scene.patches.points, matrix, *SIZE, 4, GT200, counting=False)
+    subpatches, _, _ = bound_and_split(scene.patches.points, matrix, *SIZE, 4, GT200, counting=False)
     return dice(scene.patches.points, subpatches, matrix, *SIZE, GT200, counting=False)[0]
 
 
@@ -46,8 +47,10 @@ def test_bucket_count_with_every_conflict(benchmark, tile):
 @pytest.mark.parametrize("spp", [1, 4])
 def test_frame(benchmark, spp, counting):
     scene, matrix = scene_and_matrix()
-    options = {"spp": spp, "counting": counting}
-    frame = benchmark.pedantic(
-        micropolygon, (scene, matrix, *SIZE, GT200, MicropolygonOptions(**options)), rounds=5, warmup_rounds=1
-    )
+    options = MicropolygonOptions(spp=spp)
+
+    def draw():
+        return micropolygon(scene, matrix, *SIZE, GT200, options, Executor(counting=counting))
+
+    frame = benchmark.pedantic(draw, rounds=5, warmup_rounds=1)
     benchmark.extra_info.update({key: frame.facts[key] for key in ("subpatches", "patches_written")})

@@ -24,17 +24,20 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.sampler import Sampler
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bezier import LANES, screen_points
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
-from tilestamp.simulator.stages.eisenacher2010.split_counts import pass_works, scan_works, transform_work
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.stages.eisenacher2010.split_counts import (
+    oracle_work,
+    scan_works,
+    subdivide_work,
+    transform_work,
+)
 
 BLOCK = 256  # threads, a sub-patch each
 GRID_SIDE = 4  # control points
 MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 bits
-BOX = 5  # numbers: x0, y0, x1, y1, area
 MAX_QUEUE = 2**24  # sub-patches
 
 BoundRule = Literal["control_points", "pixel_extent"]
@@ -55,9 +58,7 @@ class SubPatches(NamedTuple):
 
 
 @kernel
-def _subdivide(
-    part: Any, parts: Any, queue: Any, path: Any, boxes: Any, places: Any, target: Any, target_path: Any, moved: Any
-) -> Any:
+def _subdivide(part: Any, parts: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
     """Move what is kept, and write the four children of what is split, u first: one part of the queue."""
     for k in range(part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts):
         place = places[k]
@@ -66,8 +67,6 @@ def _subdivide(
             target.level[place] = queue.level[k]
             target.i[place], target.j[place] = queue.i[k], queue.j[k]
             target_path[place] = KEEP
-            if moved.shape[0] > 0:
-                moved[place] = boxes[k]
         elif path[k] >= ACROSS:
             for child in range(4):
                 target.patch[place + child] = queue.patch[k]
@@ -90,9 +89,7 @@ def bound_and_split(
     near: float = 0.0,
     min_depth: int = 0,
     max_depth: int = MAX_DEPTH,
-    wanted: list[NDArray[np.float32]] | None = None,
-    sample: Sampler | None = None,
-) -> tuple[SubPatches, list[Work]]:
+) -> StageResult[SubPatches]:
     """Subdivide patches until their sub-patches are small on screen.
 
     Parameters
@@ -117,16 +114,11 @@ def bound_and_split(
     max_depth : int
         Halvings after which a sub-patch that is still large, or across the eye plane, is given up: it is dropped and
         counted in ``SubPatches.passes``.
-    wanted : list, optional
-        Is given (N, 5) float32: box x0, y0, x1, y1 in pixels of each sub-patch's control points, and its area.
-    sample : Sampler, optional
-        Count long passes in part of their blocks.
 
     Returns
     -------
-    subpatches : SubPatches
-    works : list of Work
-        Transform; then oracle, scan and subdivide of each pass. A row a block.
+    outputs : SubPatches
+    works : transform; then oracle, scan and subdivide of each pass; a row a block
 
     Raises
     ------
@@ -137,33 +129,29 @@ def bound_and_split(
     screen = screen_points(points, matrix, width, height)
     size, limit = np.array([width, height, near], np.float32), np.float32(bound)
     queue, path = _first_queue(len(points))
-    boxes = np.empty((0 if wanted is None else len(points), BOX), np.float32)
     works = [transform_work(len(points), simt)] if counting else []
     passes = []
     while True:
         whole_pixels = bound_rule == "pixel_extent"
         parts = parts_of(len(path), BLOCK)
         for_parts(
-            examine, parts, GRID_SIDE, LANES, screen, queue, path, boxes, size, limit, whole_pixels,
+            examine, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels,
             min_depth, max_depth,
         )  # fmt: skip
         slots = _SLOTS[path]
-        places, scan = bucket_scan(slots, simt, counting=counting)
+        places, scan, _ = bucket_scan(slots, simt, counting=counting)
         culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
         passes.append([len(path), culled, kept, across + split, given_up])
         if counting:
-            oracle, subdivision = pass_works(queue.patch, path, places, simt, sample)
-            works += [oracle(), *scan_works(scan)]
+            works += [oracle_work(queue.patch, path, simt), *scan_works(scan)]
         if kept == len(path):
             break
         if counting:
-            works.append(subdivision())
-        queue, path, boxes = _next_queue(queue, path, boxes, places, int(slots.sum()), bound)
+            works.append(subdivide_work(path, places, simt))
+        queue, path = _next_queue(queue, path, places, int(slots.sum()), bound)
         if across + split == 0:
             break
-    if wanted is not None:
-        wanted.append(boxes)
-    return SubPatches(*queue[:4], np.array(passes, np.int64)), works
+    return StageResult(SubPatches(*queue[:4], np.array(passes, np.int64)), tuple(works))
 
 
 def _first_queue(patches: int) -> tuple[SubPatches, NDArray[np.uint8]]:
@@ -189,11 +177,10 @@ def _empty_queue(length: int) -> tuple[SubPatches, NDArray[np.uint8]]:
 def _next_queue(
     queue: SubPatches,
     path: NDArray[np.uint8],
-    boxes: NDArray[np.float32],
     places: NDArray[np.uint32],
     length: int,
     bound: float,
-) -> tuple[SubPatches, NDArray[np.uint8], NDArray[np.float32]]:
+) -> tuple[SubPatches, NDArray[np.uint8]]:
     """Fill the other buffer."""
     if length > MAX_QUEUE:
         raise TilestampError(
@@ -201,10 +188,9 @@ def _next_queue(
             "take a larger bound, a smaller image or a camera further away"
         )
     target, target_path = _empty_queue(length)
-    moved = np.empty((length if len(boxes) else 0, BOX), np.float32)
     parts = parts_of(len(path), BLOCK)
-    for_parts(_subdivide, parts, queue, path, boxes, places, target, target_path, moved)
-    return target, target_path, moved
+    for_parts(_subdivide, parts, queue, path, places, target, target_path)
+    return target, target_path
 
 
 def _check(points: NDArray[np.float32], min_depth: int, max_depth: int) -> None:

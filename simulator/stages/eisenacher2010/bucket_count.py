@@ -10,6 +10,7 @@ all lanes of a warp that want the same tile.
 """
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numba import get_num_threads
@@ -21,6 +22,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import (
     atomic_rule,
     keep_leaders,
@@ -171,6 +173,13 @@ def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, t
                     _count_atomic(tile[slot], lanes, rule, aggregate, wanted, row, chunk_requests, addresses)
 
 
+class Counted(NamedTuple):
+    """What the first half of bucketing leaves."""
+
+    counts: NDArray[np.uint32]  # (tiles,) COUNT: patches in each tile
+    idx: NDArray[np.uint32]  # (N, slots**2) IDX: place in the list of each slot's tile; 0 where it holds none
+
+
 def bucket_count(
     boxes: NDArray[np.float32],
     tiles: Tiles,
@@ -179,7 +188,7 @@ def bucket_count(
     padding: int = 1,
     aggregate: bool = False,
     counting: bool = True,
-) -> tuple[NDArray[np.uint32], NDArray[np.uint32], list[Work]]:
+) -> StageResult[Counted]:
     """Count the patches of each tile and give each patch its place.
 
     Parameters
@@ -197,12 +206,8 @@ def bucket_count(
 
     Returns
     -------
-    count : ndarray, (tiles,), uint32
-        COUNT: patches in each tile.
-    idx : ndarray, (N, slots**2), uint32
-        IDX: place of the patch in the list of the tile in each slot; 0 where the slot holds no tile.
-    works : list of Work
-        Init and address calculation, a row a block.
+    outputs : Counted
+    works : init and address calculation, a row a block
     """
     rule = atomic_rule(simt, padding)
     blocks, parts = -(-len(boxes) // BLOCK), get_num_threads()
@@ -216,18 +221,12 @@ def bucket_count(
     idx = np.zeros((len(boxes), tiles.slots**2), np.uint32)
     _place(slots, count, idx)
     if table is None:
-        return count, idx, []
-    return (
-        count,
-        idx,
-        [
-            init_work(tiles, padding, simt),
-            address_work(len(boxes), tiles, table, requests.sum(axis=0), aggregate=aggregate),
-        ],
-    )
+        return StageResult(Counted(count, idx))
+    works = _init_work(tiles, padding, simt), _address_work(len(boxes), tiles, table, requests.sum(axis=0), aggregate)
+    return StageResult(Counted(count, idx), works)
 
 
-def init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
+def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     """Work of setting COUNT to zero."""
     words = tiles.total * padding
     sizes = np.full(-(-words // BLOCK), BLOCK)
@@ -251,12 +250,11 @@ def init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     )
 
 
-def address_work(
+def _address_work(
     patches: int,
     tiles: Tiles,
     table: NDArray[np.int64],
     requests: NDArray[np.int64],
-    *,
     aggregate: bool,
 ) -> Work:
     """Work of the address calculation, from the rows of its blocks and the atomic requests by chunk."""

@@ -15,6 +15,7 @@ from tilestamp.models.coalescing import contiguous
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
@@ -42,9 +43,7 @@ class BucketScanEvent(IntEnum):
 _E = BucketScanEvent
 
 
-def bucket_scan(
-    count: NDArray[np.uint32], simt: Simt, *, counting: bool = True
-) -> tuple[NDArray[np.uint32], list[Work]]:
+def bucket_scan(count: NDArray[np.uint32], simt: Simt, *, counting: bool = True) -> StageResult[NDArray[np.uint32]]:
     """Prefix sum of COUNT.
 
     Parameters
@@ -56,10 +55,9 @@ def bucket_scan(
 
     Returns
     -------
-    start : ndarray, (tiles,), uint32
+    outputs : ndarray, (tiles,), uint32
         START: patches in all tiles before.
-    works : list of Work
-        One for each launch: block scans level by level, then the sums added back from the top.
+    works : one for each launch: block scans level by level, then the sums added back from the top
 
     Raises
     ------
@@ -71,13 +69,13 @@ def bucket_scan(
         raise TilestampError(f"{ends[-1]} patches in tiles are more than 32-bit lists hold: draw a smaller image")
     start = (ends - count).astype(np.uint32)
     if not counting:
-        return start, []
+        return StageResult(start)
     sizes = [len(count)]
     while sizes[-1] > ELEMENTS:
         sizes.append(-(-sizes[-1] // ELEMENTS))
     up = [_scan_work(level, size, simt) for level, size in enumerate(sizes)]
     down = [_add_work(level, sizes[level], simt) for level in range(len(sizes) - 2, -1, -1)]
-    return start, up + down
+    return StageResult(start, (*up, *down))
 
 
 def tree_steps(simt: Simt) -> tuple[int, int]:

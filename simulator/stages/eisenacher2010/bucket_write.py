@@ -13,6 +13,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import (
     BLOCK,
     BOX_BYTES,
@@ -115,7 +116,7 @@ def bucket_write(
     simt: Simt,
     *,
     counting: bool = True,
-) -> tuple[NDArray[np.uint32], list[Work]]:
+) -> StageResult[NDArray[np.uint32]]:
     """Write the list of patches of each tile.
 
     Parameters
@@ -133,36 +134,32 @@ def bucket_write(
 
     Returns
     -------
-    lists : ndarray, (sum of count,), uint32
+    outputs : ndarray, (sum of count,), uint32
         LISTS: patches of tile t at start[t]..start[t]+count[t]-1.
-    works : list of Work
-        One, a row a block.
+    works : one, a row a block
     """
     lists = np.empty(int(count.sum(dtype=np.int64)), np.uint32)
     _write(boxes, tiles, start, idx, lists)
     if not counting:
-        return lists, []
+        return StageResult(lists)
     table = np.zeros((-(-len(boxes) // BLOCK), len(_E)), np.int64)
     parts = parts_of(len(table))
     for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
-    streams = write_streams(table, len(boxes), tiles, count)
-    return lists, [
-        Work(
-            stage="bucket_write",
-            kernel="bucket_write",
-            events=_E,
-            table=table,
-            grid=len(table),
-            block=BLOCK,
-            streams=streams,
-            variant=tiles.variant,
-        )
-    ]
+    streams = _streams(table, len(boxes), tiles, count)
+    work = Work(
+        stage="bucket_write",
+        kernel="bucket_write",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        streams=streams,
+        variant=tiles.variant,
+    )
+    return StageResult(lists, (work,))
 
 
-def write_streams(
-    table: NDArray[np.int64], patches: int, tiles: Tiles, count: NDArray[np.uint32]
-) -> tuple[Stream, ...]:
+def _streams(table: NDArray[np.int64], patches: int, tiles: Tiles, count: NDArray[np.uint32]) -> tuple[Stream, ...]:
     """Buffers that the kernel touches, from the rows of its blocks."""
     total = table.sum(axis=0)
     own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])

@@ -17,6 +17,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010 import shading
 from tilestamp.simulator.stages.eisenacher2010.bezier import (
     LANES,
@@ -42,7 +43,6 @@ from tilestamp.simulator.stages.eisenacher2010.shading import (
     shade,
     tangent,
 )
-from tilestamp.simulator.work import Work
 
 GRID_SIDE = 4  # vertices
 
@@ -155,7 +155,7 @@ def dice(
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
     shaded: bool = True,
-) -> tuple[Grids, list[Work]]:
+) -> StageResult[Grids]:
     """Evaluate and shade a 4x4 grid for each sub-patch.
 
     Parameters
@@ -177,9 +177,8 @@ def dice(
 
     Returns
     -------
-    grids : Grids
-    works : list of Work
-        One, a row a block.
+    outputs : Grids
+    works : one, a row a block
 
     Raises
     ------
@@ -213,4 +212,5 @@ def dice(
         colors,
         grids.boxes,
     )
-    return grids, [dice_work(subpatches.patch, len(points), texture is not None, simt)] if counting else []
+    works = (dice_work(subpatches.patch, len(points), texture is not None, simt),) if counting else ()
+    return StageResult(grids, works)

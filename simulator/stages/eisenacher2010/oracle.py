@@ -112,17 +112,6 @@ def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
 
 
 @kernel
-def _store_box(s: Any, n: Any, out: Any) -> Any:
-    """Box x0, y0, x1, y1 of lane ``n``, and half the cross product of the diagonals between its corners."""
-    out[0], out[1], out[2], out[3] = s.box[0, n], s.box[1, n], s.box[2, n], s.box[3, n]
-    a, b, c, d = n, 3 * LANES + n, 12 * LANES + n, 15 * LANES + n
-    net, w = s.net, 2 * _ROW
-    x0, y0 = net[d] / net[w + d] - net[a] / net[w + a], net[_ROW + d] / net[w + d] - net[_ROW + a] / net[w + a]
-    x1, y1 = net[c] / net[w + c] - net[b] / net[w + b], net[_ROW + c] / net[w + c] - net[_ROW + b] / net[w + b]
-    out[4] = np.float32(0.5) * abs(x0 * y1 - x1 * y0)
-
-
-@kernel
 def examine(
     part: Any,
     parts: Any,
@@ -131,7 +120,6 @@ def examine(
     screen: Any,
     queue: Any,
     path: Any,
-    boxes: Any,
     size: Any,
     bound: Any,
     whole_pixels: Any,
@@ -140,8 +128,7 @@ def examine(
 ) -> Any:
     """Examine one part of the queue, ``width`` (LANES) at once; a sub-patch that was kept before is kept again.
 
-    ``size`` is width and height of the screen in pixels, and the nearest w that is drawn; ``boxes``, (queue length, 5)
-    or without rows, takes the box of each sub-patch kept, and the area of the quadrangle of its corners.
+    ``size`` is width and height of the screen in pixels, and the nearest w that is drawn.
     """
     s, squares = _new_scratch(side, width), new_squares(width)
     picked = np.empty(LANES, np.int64)
@@ -163,6 +150,4 @@ def examine(
             found = _path(s, n, bound, whole_pixels)
             if found == KEEP and queue.level[picked[n]] < min_depth:
                 found = SPLIT
-            if found == KEEP and boxes.shape[0] > 0:
-                _store_box(s, n, boxes[picked[n]])
             path[picked[n]] = GIVE_UP if found >= ACROSS and queue.level[picked[n]] >= max_depth else found

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
 from tilestamp.simulator.stages.eisenacher2010.dice import Grids
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import dice_work
@@ -67,19 +68,33 @@ def shared_edges(points: NDArray[np.float32]) -> NDArray[np.int64]:
     return found
 
 
-def snap_edges(subpatches: SubPatches, grids: Grids, shared: NDArray[np.int64]) -> Snapped:
+def snap_edges(
+    points: NDArray[np.float32],
+    subpatches: SubPatches,
+    grids: Grids,
+    simt: Simt,
+    *,
+    textured: bool = False,
+) -> StageResult[Snapped]:
     """Put the vertices of finer sub-patches on the edges of their coarser neighbours.
 
     Parameters
     ----------
+    points : ndarray, (P, 16, 4), float32
+        Control points of the urPatches.
     subpatches : SubPatches
     grids : Grids
         Diced from them.
-    shared : ndarray, (P, 4, 3), int64
-        Of ``shared_edges``.
+    simt : Simt
+    textured : bool
+
+    Returns
+    -------
+    outputs : Snapped
+    works : the look-ups, and dicing the sub-patches concerned again; none where all are of one depth
     """
     patch, level, i, j = (array.astype(np.int64) for array in subpatches[:4])
-    keys = _keys(patch, level, i, j)
+    shared, keys = shared_edges(points), _keys(patch, level, i, j)
     order = np.argsort(keys)
     table = keys[order]
     vertices, touched, lookups = grids.vertices.copy(), np.zeros(len(keys), np.bool_), np.zeros(len(keys), np.int64)
@@ -93,34 +108,21 @@ def snap_edges(subpatches: SubPatches, grids: Grids, shared: NDArray[np.int64]) 
                 _snap(vertices, fine[known], edge, order[at[known]], other_edge[known], along[known], up)
                 touched[fine[known]] = True
                 fine, other, other_edge, along = (a[~known] for a in (fine, other, other_edge, along))
-    return Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
+    snapped = Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
+    return StageResult(snapped, _works(snapped, subpatches.patch, len(points), simt, textured))
 
 
-def snap_works(
-    snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, *, textured: bool = False
-) -> list[Work]:
-    """Works of snapping: the look-ups, and dicing the sub-patches concerned again; none where all are of one depth.
-
-    Parameters
-    ----------
-    snapped : Snapped
-    patch : ndarray, (N,), int32
-        UrPatch of each sub-patch.
-    patches : int
-        UrPatches of the scene.
-    simt : Simt
-    textured : bool
-    """
+def _works(snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, textured: bool) -> tuple[Work, ...]:
     if not snapped.touched.any():
-        return []
+        return ()
     starts = np.arange(0, len(snapped.touched), BLOCK)
     counts = np.stack([snapped.lookups, snapped.touched], axis=1).astype(np.int64)
     table = np.add.reduceat(counts, starts, axis=0)
     again = dice_work(patch[snapped.touched], patches, textured, simt)
-    return [
+    return (
         Work(stage="snap_edges", kernel="snap_edges", events=SnapEvent, table=table, grid=len(starts), block=BLOCK),
         replace(again, stage="snap_edges"),
-    ]
+    )
 
 
 def _keys(patch: _I64, level: _I64, i: _I64, j: _I64) -> _I64:

@@ -4,10 +4,9 @@ The shape of the kernels is ours where the paper is silent: 256 threads a block,
 8 bytes (patch index; level, i and j packed); 16 loads of 16 bytes for the control points; storage wishes of 4 bytes.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import IntEnum
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,9 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.sampler import Sampler
 from tilestamp.simulator.work import Work
 
 STAGE = "bound_and_split"
-SAMPLED_QUEUE = 2**17  # sub-patches of a pass from which on a sampler counts part of its blocks
 BLOCK = 256  # threads
 ENTRY_BYTES = 8
 POINT_BYTES = 16  # a homogeneous control point
@@ -216,7 +213,7 @@ def oracle_streams(table: NDArray[np.int64], patch: NDArray[np.int32]) -> tuple[
     )
 
 
-def scan_works(scan: list[Work]) -> list[Work]:
+def scan_works(scan: Sequence[Work]) -> list[Work]:
     """Works of the scan, which is that of bucketing, under the names of this stage."""
     names: dict[str, Any] = {"COUNT": "slots", "START": "places"}
     return [
@@ -254,41 +251,3 @@ def subdivide_streams(table: NDArray[np.int64], length: int) -> tuple[Stream, ..
         Stream("places", "load", int(total[_S.LOAD_BYTES]) - loads + length * WORD_BYTES, length * WORD_BYTES),
         Stream("queue", "store", int(total[_S.STORE_BYTES]), written),
     )
-
-
-def pass_works(
-    patch: NDArray[np.int32],
-    path: NDArray[np.uint8],
-    places: NDArray[np.uint32],
-    simt: Simt,
-    sample: Sampler | None,
-) -> tuple[Callable[[], Work], Callable[[], Work]]:
-    """Count one pass of oracle and subdivision when asked to; with a sampler, a long one in part of its blocks."""
-    if sample is None or len(path) < SAMPLED_QUEUE:
-        return partial(oracle_work, patch, path, simt), partial(subdivide_work, path, places, simt)
-    first = np.arange(0, len(path), BLOCK)
-    kept = np.add.reduceat(path == _KEEP, first, dtype=np.int64)
-    split = np.add.reduceat(path >= _ACROSS, first, dtype=np.int64)
-
-    def some(make: Callable[..., Work], *arrays: NDArray[Any]) -> Callable[[NDArray[np.int64]], Work]:
-        """Blocks one after another: their rows hang on nothing before them."""
-
-        def execute(units: NDArray[np.int64]) -> Work:
-            order = np.argsort(units)  # a block that is not full comes last
-            entries = (units[order, None] * BLOCK + np.arange(BLOCK)).ravel()
-            entries = entries[entries < len(path)]
-            work = make(*(array[entries] for array in arrays), simt)
-            return replace(work, table=work.table[np.argsort(order)])
-
-        return execute
-
-    ones = np.ones(len(first))
-    return (
-        partial(
-            sample.stage, ones, some(oracle_work, patch, path), lambda t: oracle_streams(t, patch), (kept, split)
-        ),
-        partial(
-            sample.stage, ones, some(subdivide_work, path, places), lambda t: subdivide_streams(t, len(path)),
-            (kept, split),
-        ),
-    )  # fmt: skip

@@ -9,7 +9,7 @@ charged for every warp and lane that its kernel would keep busy (``tile_raster_e
 outside a quad's box are charged for the edge functions and taken as misses.
 """
 
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import divisible
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     EDGE_VECTORS,
@@ -33,6 +34,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     count_block,
     count_stores,
 )
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_known import known_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
@@ -113,6 +115,76 @@ def _raster_tiles(
             count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
 
 
+class Pixels(NamedTuple):
+    """What the tiles show; of tiles that were not drawn it means nothing."""
+
+    image: NDArray[np.uint8]  # (H, W, 3)
+    depth: NDArray[np.float32]  # (H, W) of the nearest sample of each pixel; 1 where nothing was drawn
+    overdraw: NDArray[np.int32] | None  # (H, W) quads that cover a sample, summed over the samples of each pixel
+
+
+def shared_bytes(shape: BlockShape) -> int:
+    """Shared memory a block: a batch of grids, their edge equations if loaded, all samples where they are resolved."""
+    threads = shape.tile**2
+    grids = threads // VERTICES
+    samples = threads * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
+    return grids * (VERTICES + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
+
+
+def _streams(
+    table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, shape: BlockShape, simt: Simt
+) -> tuple[Stream, ...]:
+    """Buffers that the kernel touches, by the rows of all tiles; of ``grids`` those that are in a list."""
+    total = table.sum(axis=0)
+    seen = np.zeros(grids, np.bool_)
+    seen[lists] = True
+    drawn = int(np.count_nonzero(seen))
+    vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
+    edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
+    rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
+    streams = [
+        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES),
+        Stream("LISTS", "load", rest, len(lists) * WORD_BYTES + 2 * len(table) * WORD_BYTES),
+        Stream("framebuffer", "store", int(total[_E.STORE_BYTES]), int(total[_E.STORE_BYTES])),
+    ]
+    if shape.loaded:
+        streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
+    return tuple(streams)
+
+
+def _work(
+    table: NDArray[np.int64],
+    vertices: NDArray[np.float32],
+    lists: NDArray[np.uint32],
+    tiles: Tiles,
+    simt: Simt,
+    *,
+    spp: int,
+    box_tests: bool,
+    edges: str,
+    **_: Any,
+) -> Work:
+    """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
+    shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+    return raster_work(shape, table, _streams(table, lists, len(vertices), shape, simt))
+
+
+def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
+    """Work of the kernel, a row a tile."""
+    return Work(
+        stage="tile_raster",
+        kernel="tile_raster",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=shape.tile**2,
+        shared_bytes=shared_bytes(shape),
+        streams=streams,
+        variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
+    )
+
+
+@divisible(known=known_tiles, work=_work)
 def tile_raster(
     vertices: NDArray[np.float32],
     count: NDArray[np.uint32],
@@ -127,8 +199,8 @@ def tile_raster(
     box_tests: bool = True,
     edges: Edges = "computed",
     counting: bool = True,
-    only: NDArray[np.int64] | None = None,
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32] | None, list[Work]]:
+    units: NDArray[np.int64] | None = None,
+) -> tuple[Pixels, NDArray[np.int64] | None]:
     """Draw the grids of each tile.
 
     Parameters
@@ -151,18 +223,13 @@ def tile_raster(
         Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture.
     counting : bool
         Without it no events are counted and no works come back.
-    only : ndarray, int64, optional
-        Tiles to draw, where not all; the pixels of the others mean nothing.
+    units : ndarray, int64, optional
+        Tiles to draw, where not all.
 
     Returns
     -------
-    image : ndarray, (H, W, 3), uint8
-    depth : ndarray, (H, W), float32
-        Depth of the nearest sample of each pixel; 1 where nothing was drawn.
-    overdraw : ndarray, (H, W), int32, or None
-        Quads that cover a sample, summed over the samples of each pixel.
-    works : list of Work
-        One, a row a tile drawn.
+    Pixels
+    works : one, a row a tile
 
     Raises
     ------
@@ -175,57 +242,11 @@ def tile_raster(
     image = np.empty((height, width, 3), np.uint8)
     depth = np.empty((height, width), np.float32)
     overdraw = np.empty((height, width), np.int32) if counting else None
-    blocks = np.arange(tiles.total) if only is None else only
+    blocks = np.arange(tiles.total) if units is None else units
     table = np.zeros((len(blocks), len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
     colors = vertices.view(np.uint32)[:, :, 3]
     buffers = (image, depth, overdraw, table)
     parts = parts_of(len(blocks), _PART_TILES)
     for_parts(_raster_tiles, parts, blocks, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
-    if table is None:
-        return image, depth, overdraw, []
-    seen = np.zeros(len(vertices), np.bool_)
-    seen[lists] = True
-    works = [raster_work(shape, table, raster_streams(table, len(lists), int(np.count_nonzero(seen)), shape, simt))]
-    return image, depth, overdraw, works
-
-
-def shared_bytes(shape: BlockShape) -> int:
-    """Shared memory a block: a batch of grids, their edge equations if loaded, all samples where they are resolved."""
-    threads = shape.tile**2
-    grids = threads // VERTICES
-    samples = threads * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
-    return grids * (VERTICES + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
-
-
-def raster_streams(
-    table: NDArray[np.int64], entries: int, drawn: int, shape: BlockShape, simt: Simt
-) -> tuple[Stream, ...]:
-    """Buffers that the kernel touches, by the rows of all tiles, the entries of their lists, and the grids in any."""
-    total = table.sum(axis=0)
-    vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
-    edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
-    rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
-    streams = [
-        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES),
-        Stream("LISTS", "load", rest, entries * WORD_BYTES + 2 * len(table) * WORD_BYTES),
-        Stream("framebuffer", "store", int(total[_E.STORE_BYTES]), int(total[_E.STORE_BYTES])),
-    ]
-    if shape.loaded:
-        streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
-    return tuple(streams)
-
-
-def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
-    """Work of the kernel, a row a tile."""
-    return Work(
-        stage="tile_raster",
-        kernel="tile_raster",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=shape.tile**2,
-        shared_bytes=shared_bytes(shape),
-        streams=streams,
-        variant=f"tile {shape.tile} spp {shape.side**2}" + ("" if shape.box_tests else " no box"),
-    )
+    return Pixels(image, depth, overdraw), table

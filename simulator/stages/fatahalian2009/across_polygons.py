@@ -19,6 +19,7 @@ from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
@@ -58,7 +59,7 @@ class AcrossPolygonsEvent(IntEnum):
     LOAD_BYTES = 12
 
 
-def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> Work:
+def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples``.
 
     Parameters
@@ -71,8 +72,8 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
 
     Returns
     -------
-    Work
-        A row for each chunk of 256 polygons.
+    outputs : Samples
+    works : one, a row for each chunk of 256 polygons
     """
     simt = Simt(*map(int, simt))
     table = np.zeros((-(-len(polygons.patch) // CHUNK), len(AcrossPolygonsEvent)), np.int64)
@@ -89,7 +90,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
         ),
     )
     shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
-    return Work(
+    work = Work(
         stage="across_polygons",
         kernel="across_polygons",
         events=events,
@@ -101,6 +102,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
         streams=streams,
         atomic_requests=samples.requests,
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

@@ -8,6 +8,7 @@ point. How far it moves makes no difference; there are as many set-ups as distin
 import numpy as np
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, pixel_box
 from tilestamp.simulator.stages.fatahalian2009.motion import (
@@ -23,12 +24,22 @@ from tilestamp.simulator.work import Work
 BLOCK = 128
 
 
-def motion_interleaved(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> Work:
+def motion_interleaved(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> StageResult[Samples]:
     """Draw moving polygons by interleaving; a row of work for each 256 polygons."""
     table = np.zeros((-(-len(polygons.start) // CHUNK), len(MotionEvent)), np.int64)
     _motion_interleaved(polygons.start, polygons.end, polygons.blur, pattern, samples, table)
-    return Work(
-        stage="motion", kernel="interleaved", events=MotionEvent, table=table, grid=max(1, len(table)), block=BLOCK
+    return StageResult(
+        samples,
+        (
+            Work(
+                stage="motion",
+                kernel="interleaved",
+                events=MotionEvent,
+                table=table,
+                grid=max(1, len(table)),
+                block=BLOCK,
+            ),
+        ),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples
 from tilestamp.simulator.stages.fatahalian2009.motion import (
@@ -32,22 +33,25 @@ def intervals_of(pattern: BlurPattern) -> NDArray[np.float64]:
     return np.ascontiguousarray(np.stack([low, high], axis=2).reshape(-1, 6))
 
 
-def motion_interval(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> Work:
+def motion_interval(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> StageResult[Samples]:
     """Draw moving polygons by intervals; a row of work for each 256 polygons."""
     return _draw("interval", polygons, pattern, samples, intervals_of(pattern))
 
 
-def motion_brute_force(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> Work:
+def motion_brute_force(polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples) -> StageResult[Samples]:
     """Draw moving polygons by testing every sample of every pixel that the whole blur might reach."""
     return _draw("brute force", polygons, pattern, samples, np.array([EVERYTHING] * pattern.place.shape[2]))
 
 
 def _draw(
     kernel: str, polygons: MovingMicropolygons, pattern: BlurPattern, samples: Samples, intervals: NDArray[np.float64]
-) -> Work:
+) -> StageResult[Samples]:
     table = np.zeros((-(-len(polygons.start) // CHUNK), len(MotionEvent)), np.int64)
     _motion_interval(polygons.start, polygons.end, polygons.blur, pattern, samples, intervals, table)
-    return Work(stage="motion", kernel=kernel, events=MotionEvent, table=table, grid=max(1, len(table)), block=BLOCK)
+    return StageResult(
+        samples,
+        (Work(stage="motion", kernel=kernel, events=MotionEvent, table=table, grid=max(1, len(table)), block=BLOCK),),
+    )
 
 
 @kernel

@@ -19,6 +19,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
@@ -85,7 +86,7 @@ def stamp_shape(stamp: int | tuple[int, ...], touch: Touch, coarse: int = 0) -> 
     return StampShape(width, height, touch == "polygon", coarse)
 
 
-def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: Simt) -> Work:
+def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples``.
 
     Parameters
@@ -98,8 +99,8 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
 
     Returns
     -------
-    Work
-        A row for each chunk of 256 polygons.
+    outputs : Samples
+    works : one, a row for each chunk of 256 polygons
     """
     units = -(-len(polygons.patch) // CHUNK)
     table = np.zeros((units, len(StampsEvent)), np.int64)
@@ -111,7 +112,7 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
         Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
     )
     grid = blocks(simt, WARPS)
-    return Work(
+    work = Work(
         stage="stamps",
         kernel="stamps",
         events=StampsEvent,
@@ -123,6 +124,7 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
         streams=streams,
         atomic_requests=samples.requests,
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

@@ -19,6 +19,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import row_of
 from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, play_batch
 from tilestamp.simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
@@ -63,7 +64,7 @@ def bin_raster(
     release: Literal["1.1", "nvdiffrast"] = "1.1",  # noqa: ARG001 - all four stages are called alike
     counting: bool = True,
     capacity: int | None = None,
-) -> tuple[BinQueues, Work, dict[str, Any]]:
+) -> StageResult[BinQueues]:
     """Queue every sub-triangle in the bins that it touches.
 
     Parameters
@@ -83,8 +84,8 @@ def bin_raster(
 
     Returns
     -------
-    queues : BinQueues
-    work : Work
+    outputs : BinQueues
+    works : one
         The first 16 rows are what a block does besides its batches (its start, and its last draw, which finds the
         queue empty); then one row a batch.
     facts : dict
@@ -113,15 +114,15 @@ def bin_raster(
     for_parts(_play_part, parts_of(batches), given, batch, cursors, entries, None)
     queues = BinQueues(starts, entries, counts, _stream_totals(counts), bins_x, bins_y)
     segments = int((-(-counts // BIN_SEGMENT)).sum())
-    work = _work(events, setup, len(entries), segments, segment_bytes, counts.shape[1])
+    works = () if events is None else (_work(events, setup, len(entries), segments, segment_bytes, counts.shape[1]),)
     overflow = capacity is not None and segments > capacity
     facts: dict[str, Any] = {
         "num_bin_segments": segments,
         "bytes": segments * SEGMENT_BYTES,
         "overflow": overflow,
-        "counters": _counters(work) if counting else {},
+        "counters": _counters(works[0]) if works else {},
     }
-    return queues, work, facts
+    return StageResult(queues, works, facts)
 
 
 def batch_size(triangles: int) -> int:
@@ -154,22 +155,17 @@ def _stream_totals(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     return totals
 
 
-def _work(
-    events: NDArray[np.int64] | None, setup: Any, pairs: int, segments: int, segment_bytes: int, bins: int
-) -> Work:
+def _work(events: NDArray[np.int64], setup: Any, pairs: int, segments: int, segment_bytes: int, bins: int) -> Work:
     """Put the blocks' own rows in front, and name the buffers."""
     rest = np.zeros((STREAMS, len(BinRasterEvent)), np.int64)
-    if events is None:
-        events = np.zeros((0, len(BinRasterEvent)), np.int64)
-    else:
-        E = BinRasterEvent
-        rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
-        rest[:, [E.LOAD, E.LOAD_TRANSACTIONS]] = WARPS  # each warp reads the number of triangles
-        rest[:, E.LOAD_BYTES] = WARPS * segment_bytes
-        rest[:, E.CTA_BIN_WARPS] = -(-bins // 32)
-        table_lines = 2 * -(-bins * STREAMS * ENTRY_BYTES // max(segment_bytes, STREAMS * ENTRY_BYTES))
-        rest[:, E.STORE_TRANSACTIONS] = table_lines  # its first segment and its total in every bin
-        rest[:, E.STORE_BYTES] = table_lines * segment_bytes
+    E = BinRasterEvent
+    rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
+    rest[:, [E.LOAD, E.LOAD_TRANSACTIONS]] = WARPS  # each warp reads the number of triangles
+    rest[:, E.LOAD_BYTES] = WARPS * segment_bytes
+    rest[:, E.CTA_BIN_WARPS] = -(-bins // 32)
+    table_lines = 2 * -(-bins * STREAMS * ENTRY_BYTES // max(segment_bytes, STREAMS * ENTRY_BYTES))
+    rest[:, E.STORE_TRANSACTIONS] = table_lines  # its first segment and its total in every bin
+    rest[:, E.STORE_BYTES] = table_lines * segment_bytes
     table = np.vstack([rest, events])
     visible = int(np.sum(setup.subtriangles, dtype=np.int64))
     reads = int(table[:, BinRasterEvent.LOAD_BYTES].sum())

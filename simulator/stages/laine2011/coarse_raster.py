@@ -18,6 +18,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import row_of
 from tilestamp.simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
@@ -69,7 +70,7 @@ def coarse_raster(
     deferred_clear: bool = True,
     counting: bool = True,
     capacity: int | None = None,
-) -> tuple[TileQueues, Work, dict[str, Any]]:
+) -> StageResult[TileQueues]:
     """Queue every sub-triangle in the tiles that it touches.
 
     Parameters
@@ -93,8 +94,8 @@ def coarse_raster(
 
     Returns
     -------
-    queues : TileQueues
-    work : Work
+    outputs : TileQueues
+    works : one
         The first rows, one a block, are its start and its last draw, which finds no bin; then one row a bin, in the
         order in which they are drawn.
     facts : dict
@@ -123,14 +124,14 @@ def coarse_raster(
     active = bin_tiles[order][used].astype(np.int32)
     segments = int((-(-counts // TILE_SEGMENT)).sum())
     empty = used & (counts[order] == 0)
-    work = _work(events, used, empty, simt, given, segments)
+    works = () if events is None else (_work(events, used, empty, simt, given, segments),)
     facts: dict[str, Any] = {
         "num_tile_segments": segments,
         "bytes": segments * SEGMENT_BYTES,
         "overflow": capacity is not None and segments > capacity,
-        "counters": _counters(work) if counting else {},
+        "counters": _counters(works[0]) if works else {},
     }
-    return TileQueues(starts, entries, active, given.tiles_x, given.tiles_y), work, facts
+    return StageResult(TileQueues(starts, entries, active, given.tiles_x, given.tiles_y), works, facts)
 
 
 def bin_order(totals: NDArray[np.int64], deferred_clear: bool) -> NDArray[np.int64]:
@@ -171,7 +172,7 @@ def _bin_tiles(given: CoarseInput, bins: int) -> NDArray[np.int64]:
 
 
 def _work(
-    events: NDArray[np.int64] | None,
+    events: NDArray[np.int64],
     active: NDArray[np.bool_],
     empty: NDArray[np.bool_],
     simt: Simt,
@@ -181,13 +182,10 @@ def _work(
     """Put the blocks' own rows in front, and name the buffers."""
     E = CoarseRasterEvent
     rest = np.zeros((simt.sms, len(E)), np.int64)
-    if events is None:
-        events = np.zeros((0, len(E)), np.int64)
-    else:
-        rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
-        rest[:, [E.LOAD, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]] = _sort_loads(len(given.starts) - 1, given.segment_bytes)
-        _count_ends(events, active, empty, given.segment_bytes)
-        _count_sort(rest, len(given.starts) - 1)
+    rest[:, [E.CTA_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH]] = 1
+    rest[:, [E.LOAD, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]] = _sort_loads(len(given.starts) - 1, given.segment_bytes)
+    _count_ends(events, active, empty, given.segment_bytes)
+    _count_sort(rest, len(given.starts) - 1)
     table = np.vstack([rest, events])
     entries = len(given.entries) * ENTRY_BYTES
     again = _totals_again(len(given.starts) - 1, given.segment_bytes) * simt.sms

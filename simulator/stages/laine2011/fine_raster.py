@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import divisible
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
-    HEADER_BYTES,
     PIXELS,
-    SEGMENT,
     TILE,
     Draw,
     FineRasterEvent,
@@ -29,24 +27,19 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     start_tile,
 )
 from tilestamp.simulator.stages.laine2011.fine_raster_single import draw_tile_single
+from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work, known_tiles
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
-from tilestamp.simulator.work import Work
 
 Mode = Literal["depth", "blend", "depth-only", "color"]
 
-WARPS = 20  # a block
-TABLE_BYTES = 6144  # edge coverage, shared
-WARP_BYTES = {1: 2112, 2: 1856, 4: 1856, 8: 1856}
 MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colour, interpolate
     "depth": (True, False, True, True),
     "blend": (False, True, True, True),
     "depth-only": (True, False, False, False),
     "color": (False, False, True, False),
 }
-START_LOADS = 3  # of a warp that starts: whether a buffer was too small
-DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
 
 
@@ -180,6 +173,7 @@ def clear_depth_value(depth: float) -> int:
     return int(whole / (2**32 - 1) * (DEPTH_MAX - DEPTH_MIN) + DEPTH_MIN)
 
 
+@divisible(known=known_tiles, work=fine_work)
 def fine_raster(
     setup: Setup,
     tile_starts: NDArray[np.int64],
@@ -197,8 +191,8 @@ def fine_raster(
     clear_color: int = 0,
     clear_depth: float = 1.0,
     counting: bool = True,
-    starts: bool = True,
-) -> tuple[FrameBuffers, Work]:
+    units: NDArray[np.int64] | None = None,
+) -> tuple[FrameBuffers, NDArray[np.int64] | None]:
     """Draw the queued triangles of all active tiles.
 
     Parameters
@@ -227,14 +221,13 @@ def fine_raster(
     clear_depth : float
         0 to 1; release nvdiffrast always clears to 1.
     counting : bool
-    starts : bool
-        Count what the warps do besides tiles, too; not where only part of the tiles is drawn.
+    units : ndarray, int64, optional
+        Places in ``active_tiles`` of those to draw, where not all.
 
     Returns
     -------
-    buffers : FrameBuffers
-    work : Work
-        A row an active tile.
+    outputs : FrameBuffers
+    works : one, a row an active tile
 
     """
     depth, blend, write_color, interpolate = MODES[mode]
@@ -256,68 +249,11 @@ def fine_raster(
     buffers = new_buffers(width, height, samples) if buffers is None else buffers
     if colors is None:
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
-    table = np.zeros((len(active_tiles) if counting else 0, len(FineRasterEvent)), np.int64)
+    drawn = active_tiles if units is None else active_tiles[units]
+    table = np.zeros((len(drawn), len(FineRasterEvent)), np.int64) if counting else None
     with np.errstate(all="ignore"):
         for_parts(
-            _draw_part, parts_of(len(active_tiles), _PART_TILES),
-            active_tiles, tile_starts, tile_entries, setup, colors, draw, buffers,
-            True if samples > 1 else None, table if counting else None,
+            _draw_part, parts_of(len(drawn), _PART_TILES),
+            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, True if samples > 1 else None, table,
         )  # fmt: skip
-    if counting and starts:
-        count_starts(table, WARPS * simt.sms, smallest_transaction_bytes(draw.coalescing))
-    shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
-    streams = fine_streams(table, setup, len(tile_entries), width, height, samples)
-    queue = None
-    if counting and release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
-        queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
-    work = Work(
-        stage="fine_raster",
-        kernel="fineRaster",
-        events=FineRasterEvent,
-        table=table,
-        grid=simt.sms,
-        block=32 * WARPS,
-        shared_bytes=shared,
-        dispatch="warp_queue",
-        streams=streams,
-        atomic_requests=queue,
-    )
-    return buffers, work
-
-
-def count_starts(table: NDArray[np.int64], warps: int, segment_bytes: int) -> None:
-    """Add what a warp does besides its tiles to the first that it draws: it starts, and its last draw finds no tile."""
-    E = FineRasterEvent
-    if len(table):
-        rows = np.bincount(np.arange(warps) % len(table), minlength=len(table))
-        for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
-            table[:, event] += rows
-        loads = START_LOADS * rows + table[:, E.ATOMIC]  # and with each draw the number of tiles
-        table[:, E.LOAD_TRANSACTIONS] += loads
-        table[:, E.LOAD_BYTES] += loads * segment_bytes
-
-
-def fine_streams(
-    table: NDArray[np.int64], setup: Setup, entries: int, width: int, height: int, samples: int
-) -> tuple[Stream, ...]:
-    """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
-
-    Tiles that share a triangle are drawn at about the same time: of headers and records what is read again is found in
-    a cache, and each passes once, or once an SM that asks for it where L1 is what keeps it.
-    """
-    E = FineRasterEvent
-    total = table.sum(axis=0)
-    lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
-    headers = int(total[E.ENTRY_LANES]) * HEADER_BYTES
-    kept = int(setup.subtriangles.sum(dtype=np.int64))
-    pixels = 2 * 4 * PIXELS * samples * (-(-width // TILE) * -(-height // TILE))
-    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS * samples
-    rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
-    records = kept * setup.planes.shape[1] * 4
-    return (
-        Stream("tile_queues", "load", lists, 4 * entries),
-        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, asked_bytes=headers),
-        Stream("triangle_data", "load", min(rest, records), records, asked_bytes=rest),
-        Stream("pixels", "load", tiles, pixels if tiles else 0),
-        Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
-    )
+    return buffers, table

@@ -14,6 +14,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.subtriangle import View
 from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
@@ -180,7 +181,8 @@ def triangle_setup(
     guard_band: bool | None = None,
     counting: bool = True,
     capacity: int | None = None,
-) -> tuple[Setup, Work, dict[str, Any]]:
+    variant: str = "",
+) -> StageResult[Setup]:
     """Cull, clip and set up all triangles of one draw.
 
     Parameters
@@ -206,12 +208,13 @@ def triangle_setup(
     capacity : int or None
         Slots; None: F + 4096. Where more are needed nothing is lost: ``facts["numSubtris"]`` says how many, and the
         caller draws again.
+    variant : str
+        How the kernel was compiled.
 
     Returns
     -------
-    setup : Setup
-    work : Work
-        A row a block of 64 threads.
+    outputs : Setup
+    works : one, a row a block of 64 threads
     facts : dict
         ``numSubtris``, ``capacity`` and ``overflow``.
 
@@ -255,8 +258,10 @@ def triangle_setup(
         block=BLOCK,
         shared_bytes=SHARED_BYTES,
         streams=streams,
+        variant=variant,
     )
-    return out, work, {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
+    facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
+    return StageResult(out, (work,) if counting else (), facts)
 
 
 def _asked(triangles: NDArray[np.int32]) -> int:

@@ -25,6 +25,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Coalescing, Simt
 from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     SUBPIXEL_BITS,
@@ -131,7 +132,7 @@ def freepipe(
     block: int = BLOCK,
     colors: NDArray[np.uint32] | None = None,
     counting: bool = True,
-) -> tuple[FreePipeFrame, list[Work], dict[str, Any]]:
+) -> StageResult[FreePipeFrame]:
     """Draw triangles with one thread each.
 
     Parameters
@@ -156,9 +157,8 @@ def freepipe(
 
     Returns
     -------
-    frame : FreePipeFrame
-    works : list of Work
-        One: a row a block.
+    outputs : FreePipeFrame
+    works : one, a row a block
     facts : dict
         ``fragments``, ``pixels_tested``, ``tied_pixels``, ``mixed_pixels``.
 
@@ -178,11 +178,11 @@ def freepipe(
         "frame_bytes": 8 * width * height,
     }
     if not counting:
-        return frame, [], facts
+        return StageResult(frame, (), facts)
     work = _make_work(triangles, positions, pieces, width, height, simt, packing, early, block)
     facts["pixels_tested"] = work.total(FreePipeEvent.SAMPLE_TESTS)
     facts["fragments"] = work.total(FreePipeEvent.SAMPLE_HITS)
-    return frame, [work], facts
+    return StageResult(frame, (work,), facts)
 
 
 def _check(width: int, height: int, simt: Simt) -> None:

@@ -15,12 +15,12 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
 from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
 from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, EyeSpace, Samples
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
-from tilestamp.simulator.work import Work
 
 SAMPLES = 64
 NOISE = 4  # pixels on a side of the noise texture
@@ -105,7 +105,7 @@ def _ambient_occlusion(
 
 def ambient_occlusion(
     fragments: Fragments, eye: EyeSpace, simt: Simt, *, samples: Samples = "centers"
-) -> tuple[NDArray[np.float32], list[Work]]:
+) -> StageResult[NDArray[np.float32]]:
     """Find how much light reaches each pixel.
 
     Parameters
@@ -118,10 +118,9 @@ def ambient_occlusion(
 
     Returns
     -------
-    light : ndarray, (H, W), float32
-        1 where nothing occludes; blurred.
-    works : list of Work
-        The occlusion and the blur.
+    outputs : ndarray, (H, W), float32
+        Share of the light that is left: 1 where nothing occludes; blurred.
+    works : the occlusion and the blur
 
     Raises
     ------
@@ -138,5 +137,5 @@ def ambient_occlusion(
     loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
     stores = (Access("occlusion", 4, 1),)
     occlusion = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
-    light, blur = occlusion_blur(light, simt)
-    return light, [occlusion, blur]
+    light, blur, _ = occlusion_blur(light, simt)
+    return StageResult(light, (occlusion, *blur))

@@ -15,12 +15,12 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes.texture import TextureChains, add_bilinear, nearest
 from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners
 from tilestamp.simulator.stages.ru2016.vertex_shading import ShadedVertices
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
-from tilestamp.simulator.work import Work
 
 AMBIENT = np.float32(0.2)
 DIFFUSE = np.float32(0.8)
@@ -165,7 +165,7 @@ def fragment_shading(
     simt: Simt,
     *,
     texture_filter: Filter,
-) -> tuple[NDArray[np.uint8], list[Work]]:
+) -> StageResult[NDArray[np.uint8]]:
     """Shade every fragment, and copy the colours to the window's buffer.
 
     Parameters
@@ -181,9 +181,9 @@ def fragment_shading(
 
     Returns
     -------
-    image : ndarray, (H, W, 3), uint8
-    works : list of Work
-        The shading kernel and the copy.
+    outputs : ndarray, (H, W, 3), uint8
+        The picture.
+    works : the shading kernel and the copy
     """
     height, width = visible.triangles.shape
     image = np.zeros((height, width, 3), np.uint8)
@@ -195,7 +195,8 @@ def fragment_shading(
     colors = Access("colors", 12, 3)
     drawn = visible.triangles >= 0
     textures = np.where(drawn, mesh.texture_ids[visible.triangles], np.int32(-1))
-    return image, [
+    works = (
         shading_work(drawn, textures, fragments.uvs, chains, texture_filter, simt),
         thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), (Access("window", 4, 4, word_bytes=1),)),
-    ]
+    )
+    return StageResult(image, works)

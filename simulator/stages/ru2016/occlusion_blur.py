@@ -17,6 +17,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.work import Work
 
 SIDE = 8  # pixels that a block blurs
@@ -57,7 +58,7 @@ def _blur_rows(part: int, parts: int, light: Any, out: Any) -> None:
             out[y, x] = total / np.float32(count)
 
 
-def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> tuple[NDArray[np.float32], Work]:
+def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> StageResult[NDArray[np.float32]]:
     """Blur what ambient occlusion leaves.
 
     Parameters
@@ -67,9 +68,8 @@ def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> tuple[NDArray[np.f
 
     Returns
     -------
-    light : ndarray, (H, W), float32
-    work : Work
-        One row a block.
+    outputs : ndarray, (H, W), float32
+    works : one, a row a block
     """
     out = np.empty_like(light)
     for_parts(_blur_rows, parts_of(len(light)), light, out)
@@ -90,7 +90,7 @@ def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> tuple[NDArray[np.f
         shared_bytes=SHARED_BYTES,
         streams=streams,
     )
-    return out, work
+    return StageResult(out, (work,))
 
 
 def _block(width: int, simt: Simt) -> NDArray[np.int64]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
@@ -61,7 +62,7 @@ def per_primitive_raster(
     culling: bool,
     textured: bool = False,
     samples: Samples = "centers",
-) -> tuple[Visible, Race, Work]:
+) -> StageResult[tuple[Visible, Race]]:
     """Draw triangle by triangle.
 
     Parameters
@@ -80,12 +81,10 @@ def per_primitive_raster(
 
     Returns
     -------
-    visible : Visible
-        What a protected write would leave: the nearest triangle, and the depth buffer.
-    race : Race
-        What the unprotected write leaves in this model.
-    work : Work
-        One row a block.
+    outputs : Visible, Race
+        What a protected write would leave: the nearest triangle, and the depth buffer; and what the unprotected write
+        leaves in this model.
+    works : one, a row a block
     """
     visible = np.full((height, width), -1, np.int32)
     depth = np.full((height, width), FAR, np.int32)
@@ -120,7 +119,7 @@ def per_primitive_raster(
         stage="per_primitive_raster", kernel="per_primitive_raster", events=PerPrimitiveEvent, table=events,
         grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests, variant="textured" if textured else "",
     )  # fmt: skip
-    return Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race, work
+    return StageResult((Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race), (work,))
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, textured: bool) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
 from tilestamp.simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
@@ -52,7 +53,7 @@ def tile_lists(
     tile: int,
     culling: bool,
     capacity: Capacity,
-) -> tuple[TileLists, list[Work], int]:
+) -> StageResult[TileLists]:
     """Make the lists.
 
     Parameters
@@ -72,11 +73,10 @@ def tile_lists(
 
     Returns
     -------
-    TileLists
-    works : list of Work
-        The counting launch and the scan (``safe`` only), and the filling one.
-    lost : int
-        Appends without room: 0 with ``safe``.
+    outputs : TileLists
+    works : the counting launch and the scan (``safe`` only), and the filling one
+    facts : dict
+        ``lost``: appends without room, 0 with ``safe``.
     """
     tiles = -(-width // tile) * -(-height // tile)
     blocks = max(1, -(-len(drawable) // BLOCK))
@@ -102,7 +102,8 @@ def tile_lists(
     starts = np.concatenate([[0], np.cumsum(kept)]).astype(np.int64)
     entries = np.empty(int(starts[-1]), np.int32)
     _, lost, filling = launch("tile_lists", starts, entries)
-    return TileLists(starts, entries), [filling] if room else [counting, _scan(tiles, simt), filling], lost
+    works = (filling,) if room else (counting, _scan(tiles, simt), filling)
+    return StageResult(TileLists(starts, entries), works, {"lost": lost})
 
 
 def _scan(tiles: int, simt: Simt) -> Work:

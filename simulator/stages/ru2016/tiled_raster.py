@@ -21,6 +21,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
@@ -159,7 +160,7 @@ def tiled_raster(
     simt: Simt,
     *,
     tile: int,
-) -> tuple[Visible, Work]:
+) -> StageResult[Visible]:
     """Find the nearest triangle of each pixel.
 
     Parameters
@@ -173,8 +174,8 @@ def tiled_raster(
 
     Returns
     -------
-    Visible, Work
-        One row of work a tile.
+    outputs : Visible
+    works : one, a row a tile
     """
     visible = Visible(np.full((height, width), -1, np.int32), np.full((height, width), FAR, np.float32))
     tiles = len(lists.starts) - 1
@@ -195,7 +196,7 @@ def tiled_raster(
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
         ),
     )
-    return visible, raster_work(events, tile, streams)
+    return StageResult(visible, (raster_work(events, tile, streams),))
 
 
 def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...] = ()) -> Work:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.work import Work
 
@@ -105,7 +106,7 @@ def vertex_shading(
     parts: NDArray[np.int64] | None = None,
     *,
     samples: Samples = "centers",
-) -> tuple[ShadedVertices, list[Work]]:
+) -> StageResult[ShadedVertices]:
     """Transform vertices to the screen, normals to eye space.
 
     Parameters
@@ -123,8 +124,8 @@ def vertex_shading(
 
     Returns
     -------
-    ShadedVertices, list of Work
-        A launch each part.
+    outputs : ShadedVertices
+    works : one for each part
     """
     count = len(mesh.positions)
     out = ShadedVertices(np.empty((count, 4), np.float32), np.empty((count, 3), np.float32))
@@ -138,7 +139,7 @@ def vertex_shading(
         *out,
     )
     sizes = [count] if parts is None else parts[:, 0].tolist()
-    return out, [_shading_work(size, i, simt) for i, size in enumerate(sizes)]
+    return StageResult(out, tuple(_shading_work(size, i, simt) for i, size in enumerate(sizes)))
 
 
 def _shading_work(count: int, part: int, simt: Simt) -> Work:
@@ -149,20 +150,37 @@ def _shading_work(count: int, part: int, simt: Simt) -> Work:
 
 def primitive_assembly(
     mesh: Geometry, vertices: ShadedVertices, simt: Simt, parts: NDArray[np.int64] | None = None
-) -> tuple[NDArray[np.int32], list[Work]]:
+) -> StageResult[NDArray[np.int32]]:
     """Copy each index's vertex into its primitive; drop what the original cannot draw.
 
     Returns
     -------
-    drawable : ndarray, (F',), int32
+    outputs : ndarray, (F',), int32
         Triangles whose vertices are all before the eye, in order.
-    list of Work
-        A launch each part.
+    works : one for each part
     """
     before = (vertices.screen[:, 3] > 0.0)[mesh.triangles].all(axis=1)
     sizes = [len(mesh.triangles)] if parts is None else parts[:, 1].tolist()
-    works = [_assembly_work(3 * size, i, simt) for i, size in enumerate(sizes)]
-    return np.flatnonzero(before).astype(np.int32), works
+    works = tuple(_assembly_work(3 * size, i, simt) for i, size in enumerate(sizes))
+    return StageResult(np.flatnonzero(before).astype(np.int32), works)
+
+
+def shaded_primitives(
+    mesh: Geometry,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    parts: NDArray[np.int64] | None = None,
+    *,
+    samples: Samples = "centers",
+) -> StageResult[tuple[ShadedVertices, NDArray[np.int32]]]:
+    """Vertex shading and primitive assembly, one after the other for each draw; parameters of ``vertex_shading``."""
+    vertices, shading, _ = vertex_shading(mesh, matrix, width, height, simt, parts, samples=samples)
+    drawable, assembly, _ = primitive_assembly(mesh, vertices, simt, parts)
+    return StageResult(
+        (vertices, drawable), tuple(work for pair in zip(shading, assembly, strict=True) for work in pair)
+    )
 
 
 def _assembly_work(indices: int, part: int, simt: Simt) -> Work:

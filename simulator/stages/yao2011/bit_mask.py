@@ -24,6 +24,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
@@ -72,7 +73,7 @@ class BitMaskEvent(IntEnum):
     LOAD_BYTES = 21
 
 
-def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> Work:
+def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> StageResult[Samples]:
     """Draw ``polygons`` into ``samples`` with a mask a patch.
 
     Parameters
@@ -88,8 +89,8 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
 
     Returns
     -------
-    Work
-        A row for each patch that has polygons.
+    outputs : Samples
+    works : one, a row for each patch that has polygons
     """
     simt = Simt(*map(int, simt))
     if not 1 <= lanes <= simt.warp:
@@ -107,7 +108,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
         ),
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
-    return Work(
+    work = Work(
         stage="bit_mask",
         kernel="bit_mask",
         events=BitMaskEvent,
@@ -119,6 +120,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
         streams=streams,
         atomic_requests=samples.requests,
     )
+    return StageResult(samples, (work,))
 
 
 @kernel

@@ -19,6 +19,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_bin import BLOCK, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
 from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
 from tilestamp.simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
@@ -61,7 +62,7 @@ def _coarse_rasterizer(
 
 def coarse_rasterizer(
     data: TriangleSetupData, bins: BinQueues, width: int, height: int, simt: Simt, *, hi_z: bool, unrolled: bool
-) -> tuple[TileQueues, Work]:
+) -> StageResult[TileQueues]:
     """Make the tile queues.
 
     Parameters
@@ -78,8 +79,8 @@ def coarse_rasterizer(
 
     Returns
     -------
-    TileQueues, Work
-        One row of work a bin.
+    outputs : TileQueues
+    works : one, a row a bin
     """
     columns, rows = -(-width // BIN), -(-height // BIN)
     tiles = TILES_A_ROW * TILES_A_ROW
@@ -102,7 +103,7 @@ def coarse_rasterizer(
         Stream("tile_queue", "store", int(total[CoarseRasterizerEvent.STORE_BYTES]), 4 * len(entries)),
     )
     kernel = "CoarseRasterizer" if unrolled else "CoarseRasterizer_before"
-    return TileQueues(starts, entries, columns * TILES_A_ROW), Work(
+    work = Work(
         stage="CoarseRasterizer",
         kernel=kernel,
         events=CoarseRasterizerEvent,
@@ -112,6 +113,7 @@ def coarse_rasterizer(
         shared_bytes=SHARED_BYTES,
         streams=streams,
     )
+    return StageResult(TileQueues(starts, entries, columns * TILES_A_ROW), (work,))
 
 
 def _fills(bins: BinQueues, columns: int, rows: int) -> NDArray[np.int64]:

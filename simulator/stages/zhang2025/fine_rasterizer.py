@@ -20,6 +20,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.depth import NO_DEPTH
@@ -73,7 +74,7 @@ def fine_rasterizer(
     early_z: bool,
     optimized: bool,
     whole_blocks: bool = False,
-) -> tuple[TileFragments, Work]:
+) -> StageResult[TileFragments]:
     """Rasterize all tiles.
 
     Parameters
@@ -92,7 +93,8 @@ def fine_rasterizer(
 
     Returns
     -------
-    TileFragments, Work
+    outputs : TileFragments
+    works : one
     """
     rows, columns = -(-height // TILE), -(-width // TILE)
     rows -= rows % TILES_A_BLOCK if whole_blocks and optimized else 0
@@ -118,7 +120,7 @@ def fine_rasterizer(
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
-    return out, Work(
+    work = Work(
         stage="FineRasterizer",
         kernel=kernel,
         events=FineRasterizerEvent,
@@ -128,6 +130,7 @@ def fine_rasterizer(
         shared_bytes=shared,
         streams=streams,
     )
+    return StageResult(out, (work,))
 
 
 def _by_block(events: NDArray[np.int64], group: int) -> NDArray[np.int64]:

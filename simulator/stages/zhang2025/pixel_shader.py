@@ -15,6 +15,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes.texture import TEXEL_BYTES, TextureChains
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import FRAGMENT_BYTES, TileFragments
@@ -98,7 +99,7 @@ def pixel_shader(
     texture_filter: Filter,
     opacity: float,
     optimized: bool,
-) -> tuple[FragmentStream, Work]:
+) -> StageResult[FragmentStream]:
     """Shade the stream.
 
     Parameters
@@ -118,7 +119,8 @@ def pixel_shader(
 
     Returns
     -------
-    FragmentStream, Work
+    outputs : FragmentStream
+    works : one
     """
     count = _quads(tiles.starts, fragments.masks, tiles.columns, None, None)
     stream = FragmentStream(
@@ -144,7 +146,7 @@ def pixel_shader(
         Stream("pixel_base", "atomic", 16 * count, min(16 * count, 4 * pixels)),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
-    return stream, Work(
+    work = Work(
         stage="PixelShader",
         kernel=kernel,
         events=PixelShaderEvent,
@@ -153,6 +155,7 @@ def pixel_shader(
         block=BLOCK,
         streams=streams,
     )
+    return StageResult(stream, (work,))
 
 
 def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:

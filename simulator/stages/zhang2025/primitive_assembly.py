@@ -18,6 +18,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import BLOCK, VARYINGS, VERTEX_BYTES, ShadedVertices
 from tilestamp.simulator.work import Work
@@ -146,7 +147,7 @@ def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int
 
 def primitive_assembly(
     mesh: Geometry, vertices: ShadedVertices, width: int, height: int, simt: Simt, *, culling: bool = True
-) -> tuple[Primitives, Work]:
+) -> StageResult[Primitives]:
     """Assemble, clip and cull.
 
     Parameters
@@ -161,9 +162,9 @@ def primitive_assembly(
 
     Returns
     -------
-    Primitives
+    outputs : Primitives
         All slots in use, culled ones included.
-    Work
+    works : one
     """
     count = len(mesh.triangles)
     x, y, z, w = vertices.clip.T
@@ -194,4 +195,4 @@ def primitive_assembly(
         block=BLOCK,
         streams=streams,
     )
-    return Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), work
+    return StageResult(Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), (work,))

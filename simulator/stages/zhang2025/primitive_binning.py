@@ -20,6 +20,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
 from tilestamp.simulator.stages.zhang2025.triangle_setup import launched_blocks
 from tilestamp.simulator.work import Work
@@ -104,7 +105,7 @@ def _fill(boxes: Any, columns: int, rows: int, cursor: Any, entries: Any) -> Non
 
 def primitive_binning(
     boxes: NDArray[np.float32], width: int, height: int, simt: Simt, *, triangles: int = 0
-) -> tuple[BinQueues, Work]:
+) -> StageResult[BinQueues]:
     """Bin all primitives.
 
     Parameters
@@ -158,7 +159,7 @@ def primitive_binning(
         shared_bytes=SHARED_BYTES,
         streams=streams,
     )
-    return BinQueues(starts, entries), work
+    return StageResult(BinQueues(starts, entries), (work,))
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives: int, simt: Simt) -> None:

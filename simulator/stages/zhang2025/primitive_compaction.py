@@ -14,6 +14,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.machine import Machine
 from tilestamp.models.occupancy import residency
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.thread_per_item import Access, record_transactions
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
 from tilestamp.simulator.work import Work
@@ -35,7 +36,7 @@ class PrimitiveCompactionEvent(IntEnum):
     STORE_BYTES = 6
 
 
-def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple[Primitives, Work]:
+def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> StageResult[Primitives]:
     """Close the gaps of culled primitives.
 
     Parameters
@@ -47,7 +48,8 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
 
     Returns
     -------
-    Primitives, Work
+    outputs : Primitives
+    works : one
     """
     kept = np.flatnonzero(slots.ids >= 0)
     blocks = max(1, -(-max(len(slots.ids), SLOTS_A_TRIANGLE * triangles) // BLOCK))
@@ -80,7 +82,7 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> tuple
         block=BLOCK,
         streams=streams,
     )
-    return Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), work
+    return StageResult(Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), (work,))
 
 
 def most_triangles(machine: Machine) -> int:

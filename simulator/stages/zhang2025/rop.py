@@ -8,7 +8,7 @@ number -1 here; in the original with 0, which is also the number of the frame's 
 (``zero_ends``).
 """
 
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import TileFragments
@@ -57,6 +58,14 @@ def _rop(
         )  # fmt: skip
 
 
+class Resolved(NamedTuple):
+    """Pixels, rows from the bottom."""
+
+    target: NDArray[np.float32]  # (H, W, 4)
+    depth: NDArray[np.float32]  # (H, W)
+    winners: NDArray[np.int32]  # (H, W) triangle drawn last, -1 for none
+
+
 def rop(
     data: TriangleSetupData,
     tiles: TileQueues,
@@ -69,7 +78,7 @@ def rop(
     limit: int,
     optimized: bool,
     zero_ends: bool = False,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], Work]:
+) -> StageResult[Resolved]:
     """Resolve all pixels.
 
     Parameters
@@ -91,13 +100,8 @@ def rop(
 
     Returns
     -------
-    target : ndarray, (H, W, 4), float32
-        Rows from the bottom.
-    depth : ndarray, (H, W), float32
-    winners : ndarray, (H, W), int32
-        Triangle drawn last, -1 for none.
-    work : Work
-        One row a block.
+    outputs : Resolved
+    works : one, a row a block
     """
     height, width = fragments.depth.shape
     heads, links = np.full((height, width), -1, np.int64), np.full(4 * len(stream.entries), -1, np.int64)
@@ -139,7 +143,8 @@ def rop(
         streams=streams,
     )
     far = depth > int(DEPTH_STEPS)
-    return target, np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32), winners, work
+    shown = np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32)
+    return StageResult(Resolved(target, shown, winners), (work,))
 
 
 def _add_costs(events: NDArray[np.int64]) -> None:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
-from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 _ZERO = np.float32(0.0)
@@ -32,7 +32,7 @@ def _streaming(part: int, parts: int, target: Any, image: Any) -> None:
 
 def streaming_to_frame_buffer(
     target: NDArray[np.float32], simt: Simt, *, optimized: bool
-) -> tuple[NDArray[np.uint8], Work]:
+) -> StageResult[NDArray[np.uint8]]:
     """Convert the render target.
 
     Parameters
@@ -44,9 +44,9 @@ def streaming_to_frame_buffer(
 
     Returns
     -------
-    image : ndarray, (H, W, 3), uint8
-        Row 0 is the top row.
-    work : Work
+    outputs : ndarray, (H, W, 3), uint8
+        The picture; row 0 is the top row.
+    works : one
     """
     image = np.empty((*target.shape[:2], 3), np.uint8)
     for_parts(_streaming, parts_of(len(target)), target, image)
@@ -54,4 +54,5 @@ def streaming_to_frame_buffer(
     stores = (Access("window", 4, 1) if optimized else Access("window", 4, 4, 1),)
     kernel = "StreamingToFrameBuffer" if optimized else "StreamingToFrameBuffer_before"
     pixels = target.shape[0] * target.shape[1]
-    return image, thread_per_item("StreamingToFrameBuffer", kernel, pixels, BLOCK, simt, loads, stores)
+    work = thread_per_item("StreamingToFrameBuffer", kernel, pixels, BLOCK, simt, loads, stores)
+    return StageResult(image, (work,))

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES, Primitives
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import VARYINGS
-from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 SETUP_BYTES = 140
@@ -84,7 +84,7 @@ def evaluate(plane: Any, x: Any, y: Any) -> Any:
     return plane[0] * x + plane[1] * y + plane[2]
 
 
-def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) -> tuple[TriangleSetupData, Work]:
+def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) -> StageResult[TriangleSetupData]:
     """Set up all primitives.
 
     Parameters
@@ -97,7 +97,8 @@ def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) ->
 
     Returns
     -------
-    TriangleSetupData, Work
+    outputs : TriangleSetupData
+    works : one
     """
     count = len(primitives.ids)
     data = TriangleSetupData(
@@ -111,7 +112,8 @@ def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) ->
     stores = (Access("setup", SETUP_BYTES, SETUP_BYTES // 4),)
     idle = max(0, launched_blocks(triangles) - max(1, -(-count // BLOCK)))
     stage = "TriangleSetup"
-    return data, thread_per_item(stage, stage, count, BLOCK, simt, loads, stores, idle_blocks=idle)
+    work = thread_per_item(stage, stage, count, BLOCK, simt, loads, stores, idle_blocks=idle)
+    return StageResult(data, (work,))
 
 
 def launched_blocks(triangles: int) -> int:

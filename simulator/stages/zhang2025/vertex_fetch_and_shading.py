@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.textured_mesh import Geometry
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.vertex_shading import eye_space
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
-from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 VERTEX_BYTES = 36  # position 16, normal 12, texture coordinate 8; in and out
@@ -30,7 +30,7 @@ class ShadedVertices(NamedTuple):
     varyings: NDArray[np.float32]
 
 
-def vertex_fetch_and_shading(mesh: Geometry, matrix: NDArray[Any], simt: Simt) -> tuple[ShadedVertices, Work]:
+def vertex_fetch_and_shading(mesh: Geometry, matrix: NDArray[Any], simt: Simt) -> StageResult[ShadedVertices]:
     """Transform all vertices.
 
     Parameters
@@ -42,7 +42,8 @@ def vertex_fetch_and_shading(mesh: Geometry, matrix: NDArray[Any], simt: Simt) -
 
     Returns
     -------
-    ShadedVertices, Work
+    outputs : ShadedVertices
+    works : one
     """
     clip = mesh.positions @ np.asarray(matrix, np.float32).T
     normals = mesh.normals @ eye_space(matrix).axes.T
@@ -51,4 +52,5 @@ def vertex_fetch_and_shading(mesh: Geometry, matrix: NDArray[Any], simt: Simt) -
     loads = (Access("vertices_in", VERTEX_BYTES, VERTEX_BYTES // 4),)
     stores = (Access("vertices_out", VERTEX_BYTES, VERTEX_BYTES // 4),)
     stage = "VertexFetchAndShading"
-    return ShadedVertices(clip, varyings), thread_per_item(stage, stage, count, BLOCK, simt, loads, stores)
+    work = thread_per_item(stage, stage, count, BLOCK, simt, loads, stores)
+    return StageResult(ShadedVertices(clip, varyings), (work,))

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
@@ -39,17 +38,11 @@ def _deal(part: int, parts: int, headers: Any, starts: Any, entries: Any, size: 
         area[t] = total / (2 * UNITS * UNITS)
 
 
-def tile_areas(setup: Setup, lists: TileQueues, width: int, height: int) -> NDArray[np.float64]:
-    """Area of the triangles in each tile, pixels, (tiles,) float64.
-
-    Parameters
-    ----------
-    setup : Setup
-    lists : TileQueues
-    width, height : int
-        Pixels.
-    """
-    area = np.zeros(lists.tiles_x * lists.tiles_y)
-    size = np.array([lists.tiles_x, UNITS // 2 * width, UNITS // 2 * height], np.int64)
-    for_parts(_deal, parts_of(len(area), _PART_TILES), setup.headers, lists.starts, lists.entries, size, area)
+def tile_areas(
+    setup: Setup, starts: NDArray[np.int64], entries: NDArray[np.int32], width: int, height: int
+) -> NDArray[np.float64]:
+    """Area of the triangles in each tile, pixels, (tiles,) float64; parameters as of ``fine_raster``."""
+    area = np.zeros(len(starts) - 1)
+    size = np.array([-(-width // TILE), UNITS // 2 * width, UNITS // 2 * height], np.int64)
+    for_parts(_deal, parts_of(len(area), _PART_TILES), setup.headers, starts, entries, size, area)
     return area

@@ -3,19 +3,21 @@
 The largest units are a certainty stratum: they always run, so that the schedule sees the worst imbalance as it is.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.estimate import Floats, Integers
+from tilestamp.models.launch import Stream
+from tilestamp.simulator.sampling.estimate import Floats, Integers
 
 CERTAIN = 24  # largest units, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum
 FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
-PILOT = 96  # units that the first sample draws in proportion to size, and ...
-PILOT_EACH = 5  # ... at least from each stratum
+PILOT = 200  # units that the first sample draws in proportion to size, and ...
+PILOT_EACH = 10  # ... at least from each stratum
 
 
 @dataclass(frozen=True)
@@ -63,11 +65,24 @@ class Sample:
         Units that ran of each stratum.
     rows : ndarray, (sum of taken, events)
         Of the units ``drawn(strata, taken)``.
+    exact : dict of int to ndarray, (units,)
+        Columns of the rows that are known of all units.
+    streams : callable or None
+        Buffers touched, had the totals of all rows another (events,) added; None where what is known says which.
     """
 
     strata: Strata
     taken: Integers
     rows: Integers
+    exact: Mapping[int, Integers] = field(default_factory=dict)
+    streams: Callable[[Floats], tuple[Stream, ...]] | None = None
+
+    @property
+    def sampled(self) -> Integers:
+        """Rows without what is known of all units."""
+        rows = self.rows.copy()
+        rows[:, list(self.exact)] = 0
+        return rows
 
     @property
     def complete(self) -> bool:

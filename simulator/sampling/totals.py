@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.simulator.estimate import Floats, Integers, Totals, t_quantile
-from tilestamp.simulator.strata import Sample, drawn, places
+from tilestamp.simulator.sampling.estimate import Floats, Integers, Totals, t_quantile
+from tilestamp.simulator.sampling.strata import Sample, places
 
 ENOUGH = 16  # units that ran for each thing known, before rows are predicted by them
 FEWEST_KNOWN = 2  # things: 1, and the size
 PRIOR = 1.0  # degrees of freedom that the spread usual in other strata counts for
 GENEROUS = 1.15  # of the units that the error seems to ask for: a spread is itself an estimate
 MOST_PULL = 0.9  # of one unit on its own prediction, as the spread takes it
-RARE = 0.15  # of what it does, by which one unit that was not seen may deviate (assumed), where ...
+RARE = 0.25  # of what it does, by which one unit that was not seen may deviate (assumed), where ...
 ALIKE = 0.01  # (relative) nearly all units do what is foretold, which is ...
 MOSTLY = 0.9  # of them
 
 
 @dataclass(frozen=True)
-class _Fit:
+class Fit:
     """What rows are predicted to be, and how far they are from it."""
 
     factors: Floats  # (p, k): rows are predicted as what is known times these
@@ -42,18 +42,19 @@ class _Fit:
     taken: Integers
 
 
-def _fit(sample: Sample, values: Floats) -> _Fit:
+def fit_rows(sample: Sample, values: Floats) -> Fit:
+    """Fit what is known to the values of the units that ran, (units, k); stratum by stratum what that misses."""
     strata, taken = sample.strata, sample.taken
     known = strata.ordered[places(strata, taken)]
     factors, leverage = _factors(sample, known, values)
-    residual = values - _product(known, factors)
+    residual = values - product(known, factors)
     starts = np.concatenate([[0], np.cumsum(taken)[:-1]])
     some = np.maximum(taken, 1)[:, None]
     mean = _reduce(residual, starts, taken) / some
     apart = (residual - np.repeat(mean, taken, axis=0)) / (1 - leverage)[:, None]
     spread = _reduce(apart**2, starts, taken) / np.maximum(taken - 1, 1)[:, None]
     weight = strata.units * (strata.units - taken) / some[:, 0]
-    return _Fit(factors, residual, apart, mean, spread, weight, taken)
+    return Fit(factors, residual, apart, mean, spread, weight, taken)
 
 
 def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -66,13 +67,13 @@ def _factors(sample: Sample, known: Floats, values: Floats) -> tuple[Floats, Flo
     weight = np.repeat(sample.strata.units[1:] / np.maximum(taken[1:], 1), taken[1:]) / (known[first:, 1] + 0.1)
     some = known[first:, :used]
     weighted = (some * weight[:, None]).T
-    inverse = np.linalg.pinv(_product(weighted, some), hermitian=True)
-    factors[: some.shape[1]] = _product(inverse, _product(weighted, values[first:]))
-    leverage[first:] = np.minimum((_product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
+    inverse = np.linalg.pinv(product(weighted, some), hermitian=True)
+    factors[: some.shape[1]] = product(inverse, product(weighted, values[first:]))
+    leverage[first:] = np.minimum((product(some, inverse) * weighted.T).sum(axis=1), MOST_PULL)
     return factors, leverage
 
 
-def _product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
+def product(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Floats:
     """Multiply matrices on this thread: those of a linear algebra library spin long after such small products."""
     if a.shape[0] < a.shape[1]:  # few rows
         return np.stack([(row[:, None] * b).sum(axis=0) for row in a])
@@ -103,7 +104,7 @@ def totals(sample: Sample, values: Floats) -> Totals:
     if sample.complete:
         none = np.zeros(values.shape[1])
         return Totals(values.sum(axis=0), none, none + np.inf)
-    fit = _fit(sample, values)
+    fit = fit_rows(sample, values)
     units, first = sample.strata.units, int(sample.taken[0])
     rest = sample.strata.ordered[first:].sum(axis=0) @ fit.factors + (units[1:, None] * fit.mean[1:]).sum(axis=0)
     value = values[:first].sum(axis=0) + rest
@@ -115,7 +116,7 @@ def totals(sample: Sample, values: Floats) -> Totals:
     return Totals(value, variance + unseen, np.minimum(freedom, few))
 
 
-def _rare(sample: Sample, values: Floats, fit: _Fit) -> tuple[Floats, Floats]:
+def _rare(sample: Sample, values: Floats, fit: Fit) -> tuple[Floats, Floats]:
     """Account for deviations that few units have: variance by those not seen, and degrees of freedom by those seen.
 
     Where nearly all units that ran are alike, one more is taken to deviate by ``RARE`` of what it does. Where few units
@@ -143,7 +144,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
     Every column of ``values`` is asked to reach the error. Units are spread by Neyman's rule: where there are many, and
     where they differ.
     """
-    fit, found = _fit(sample, values), totals(sample, values)
+    fit, found = fit_rows(sample, values), totals(sample, values)
     N, n = sample.strata.units, sample.taken
     relative = np.where(found.value != 0, 1 / np.where(found.value != 0, found.value, 1.0), 0.0)
     unlike = np.sqrt(_smoothed(sample, fit) * relative**2)  # by stratum and quantity
@@ -160,7 +161,7 @@ def enlarged(sample: Sample, values: Floats, error: float) -> Integers:
     return np.where(more > 0.8 * N, N, more).astype(np.int64)
 
 
-def _smoothed(sample: Sample, fit: _Fit) -> Floats:
+def _smoothed(sample: Sample, fit: Fit) -> Floats:
     """Residual variances, small samples' drawn towards what is usual: in proportion to size, or not, if less."""
     strata = sample.strata
     size = strata.sizes
@@ -171,23 +172,3 @@ def _smoothed(sample: Sample, fit: _Fit) -> Floats:
     prior = np.where(size > 0, PRIOR, 0.0)[:, None]  # units without size are alike
     smoothed: Floats = (freedom * fit.spread + prior * usual) / np.maximum(freedom + prior, 1)
     return smoothed
-
-
-def expanded(sample: Sample) -> Integers:
-    """Rows of all units, (units, events): as executed, or as foretold, so that totals are the estimates."""
-    strata, taken = sample.strata, sample.taken
-    table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
-    table[drawn(strata, taken)] = sample.rows
-    if sample.complete:
-        return table
-    values = sample.rows.astype(np.float64)
-    fit = _fit(sample, values)
-    ran = np.zeros(len(strata.order), np.bool_)
-    ran[places(strata, taken)] = True
-    rows = _product(strata.ordered[~ran], fit.factors) + np.repeat(fit.mean, strata.units - taken, axis=0)
-    np.maximum(rows, 0.0, out=rows)
-    sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
-    rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
-    ends = np.rint(np.cumsum(rows, axis=0)).astype(np.int64)
-    table[strata.order[~ran]] = np.diff(ends, axis=0, prepend=0)
-    return table

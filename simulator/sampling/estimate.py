@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 _QUANTILES = np.array([12.706, 4.303, 3.182, 2.776])  # of t at 97.5 %, for 1 to 4 degrees of freedom
 _Z = 1.959964
+MARGIN = 1.1  # few units of a skewed count say too little of its spread (chosen on 300 seeds of teapot and spot)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -40,7 +41,7 @@ class Totals(NamedTuple):
     @property
     def half_width(self) -> Floats:
         """Of the 95 % intervals."""
-        return t_quantile(self.freedom) * np.sqrt(self.variance)
+        return MARGIN * t_quantile(self.freedom) * np.sqrt(self.variance)
 
 
 def t_quantile(freedom: Floats) -> Floats:

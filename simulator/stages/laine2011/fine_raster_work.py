@@ -1,0 +1,120 @@
+"""Fine raster, what is known of tiles before they are drawn, and the work of those that were."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.coalescing import smallest_transaction_bytes
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import Known
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import HEADER_BYTES, PIXELS, SEGMENT, TILE, FineRasterEvent
+from tilestamp.simulator.stages.laine2011.tile_areas import tile_areas
+from tilestamp.simulator.stages.laine2011.triangle_setup import Release
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.work import Work
+
+WARPS = 20  # a block
+TABLE_BYTES = 6144  # edge coverage, shared
+WARP_BYTES = {1: 2112, 2: 1856, 4: 1856, 8: 1856}
+START_LOADS = 3  # of a warp that starts: whether a buffer was too small
+DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
+SAMPLE_SECONDS, ENTRY_SECONDS = 50e-9, 1e-6  # CPU time of a sample, and of an entry of a tile's list
+
+
+def known_tiles(
+    setup: Setup,
+    tile_starts: NDArray[np.int64],
+    tile_entries: NDArray[np.int32],
+    active_tiles: NDArray[np.int32],
+    width: int,
+    height: int,
+    samples: int,
+    **_: Any,
+) -> Known:
+    """Length of the list of each active tile, and the area of the triangles in it; inputs of ``fine_raster``."""
+    E, entries = FineRasterEvent, np.diff(tile_starts)[active_tiles]
+    area = tile_areas(setup, tile_starts, tile_entries, width, height)[active_tiles]
+    segments, partial = -(-entries // SEGMENT), (entries % SEGMENT > 0).astype(np.int64)
+    listed: dict[int, NDArray[Any]] = {
+        E.SEGMENTS: segments,
+        E.LIST_WARPS: segments,
+        E.PARTIAL_SEGMENTS: partial,
+        E.ENTRY_LANES: entries,
+    }
+    seconds = SAMPLE_SECONDS * len(entries) * PIXELS * samples + ENTRY_SECONDS * int(entries.sum())
+    return Known(seconds, entries, (area,), listed)
+
+
+def fine_work(
+    rows: NDArray[np.int64],
+    setup: Setup,
+    tile_entries: NDArray[np.int32],
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Release,
+    samples: int,
+    mode: str,
+    **_: Any,
+) -> Work:
+    """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``."""
+    table = _with_starts(rows, WARPS * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
+    shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
+    queue = None
+    if release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
+        queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
+    return Work(
+        stage="fine_raster",
+        kernel="fineRaster",
+        events=FineRasterEvent,
+        table=table,
+        grid=simt.sms,
+        block=32 * WARPS,
+        shared_bytes=shared,
+        dispatch="warp_queue",
+        streams=_streams(table, setup, len(tile_entries), width, height, samples),
+        atomic_requests=queue,
+        variant="" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa",
+    )
+
+
+def _with_starts(rows: NDArray[np.int64], warps: int, segment_bytes: int) -> NDArray[np.int64]:
+    """Add what a warp does besides its tiles to the first that it draws: it starts, and its last draw finds no tile."""
+    E, table = FineRasterEvent, rows.copy()
+    if len(table):
+        starts = np.bincount(np.arange(warps) % len(table), minlength=len(table))
+        for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
+            table[:, event] += starts
+        loads = START_LOADS * starts + table[:, E.ATOMIC]  # and with each draw the number of tiles
+        table[:, E.LOAD_TRANSACTIONS] += loads
+        table[:, E.LOAD_BYTES] += loads * segment_bytes
+    return table
+
+
+def _streams(
+    table: NDArray[np.int64], setup: Setup, entries: int, width: int, height: int, samples: int
+) -> tuple[Stream, ...]:
+    """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
+
+    Tiles that share a triangle are drawn at about the same time: of headers and records what is read again is found in
+    a cache, and each passes once, or once an SM that asks for it where L1 is what keeps it.
+    """
+    E = FineRasterEvent
+    total = table.sum(axis=0)
+    lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
+    headers = int(total[E.ENTRY_LANES]) * HEADER_BYTES
+    kept = int(setup.subtriangles.sum(dtype=np.int64))
+    pixels = 2 * 4 * PIXELS * samples * (-(-width // TILE) * -(-height // TILE))
+    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS * samples
+    rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
+    records = kept * setup.planes.shape[1] * 4
+    return (
+        Stream("tile_queues", "load", lists, 4 * entries),
+        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, asked_bytes=headers),
+        Stream("triangle_data", "load", min(rest, records), records, asked_bytes=rest),
+        Stream("pixels", "load", tiles, pixels if tiles else 0),
+        Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
+    )
