@@ -115,6 +115,7 @@ def snap_edges(
 def snap_works(
     snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, textured: bool
 ) -> tuple[Work, ...]:
+    """Work of the look-ups, and of dicing the sub-patches that were touched once more."""
     if not snapped.touched.any():
         return ()
     starts = np.arange(0, len(snapped.touched), BLOCK)
