@@ -161,7 +161,7 @@ def _boundary(table: "pd.DataFrame", cure: Cure) -> Boundary:
     cost = (
         f"at bound {at:g} one depth takes {one['sub-patches'] / plain['sub-patches']:.1f} times the sub-patches and "
         f"{one.ms:.3g} ms instead of {plain.ms:.3g}; snapping {snap.ms:.3g} ms for {snap.snapped:.0f} sub-patches that "
-        f"are diced again, and {snap.outputs.lookups:.0f} look-ups that are not priced"
+        f"are diced again, and {snap.lookups:.0f} look-ups that are not priced"
     )
     return Boundary("micropolygon", "bound", "pixels", *found, wrong, "one depth, or snapped edges", cost)
 
