@@ -18,7 +18,7 @@ from tilestamp.models.fidelity_bound import latest_end
 from tilestamp.models.fixed_function import pipe_time
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine
-from tilestamp.models.schedule import Loads, loads, played, start_up
+from tilestamp.models.schedule import Loads, loads, played
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
 
@@ -78,7 +78,7 @@ class _Rough:
         self.units: Loads = loads(self.asked)
         self.timing = roofline(self.asked)
         roof = longest(self.asked.terms, self.asked.units)
-        self.most = self.asked.terms["launch"] + max(roof, latest_end(self.units) + start_up(self.asked))
+        self.most = self.asked.terms["launch"] + max(roof, latest_end(self.units))
 
     def stay(self, error: float, frame: float) -> Timing:
         """Keep the roofline."""

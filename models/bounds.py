@@ -131,4 +131,5 @@ def timing(
         fidelity=fidelity,
         low=low,
         high=high,
+        residency=f"{asked.held.blocks} an SM by {asked.held.limit}",
     )

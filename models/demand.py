@@ -29,7 +29,6 @@ from tilestamp.models.machine import Machine
 from tilestamp.models.traffic import Traffic
 
 Cycles = NDArray[np.float64]
-WHOLE_SECTORS = 16  # that a warp instruction can fill: 32 lanes of 16 bytes
 
 
 @dataclass(frozen=True)
@@ -96,24 +95,17 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
 
 
 def _l1_cycles(events: Cycles, machine: Machine) -> Cycles:
-    """Cycles of the SM's load and store path: stores and what lies scattered may be slower than whole lines."""
+    """Cycles of the SM's load and store path: stores may be slower than loads, those to local memory less so.
+
+    Bytes stored beyond those of the transactions went to local memory.
+    """
     memory = machine.memory
-    line = WHOLE_SECTORS * memory.l2_line_bytes
     write = memory.l1_write_bytes_per_clock or memory.l1_bytes_per_clock
-    loads = _line_cycles(
-        events[:, E.LOAD_BYTES],
-        line * events[:, E.LOAD],
-        memory.l1_bytes_per_clock,
-        memory.l1_gather_bytes_per_clock,
-    )
-    stores = _line_cycles(events[:, E.STORE_BYTES], line * events[:, E.STORE], write, memory.l1_scatter_bytes_per_clock)
-    return loads + stores
-
-
-def _line_cycles(bytes_moved: Cycles, lines: Cycles, rate: float, scattered: float) -> Cycles:
-    """Cycles of bytes of which ``lines`` may lie in whole lines, a line a warp instruction; the rest is scattered."""
-    slower = max(0.0, 1.0 / (scattered or rate) - 1.0 / rate)
-    return bytes_moved / rate + np.maximum(0.0, bytes_moved - lines) * slower
+    stored = events[:, E.STORE_BYTES]
+    scattered = np.minimum(stored, events[:, E.STORE_TRANSACTIONS] * memory.l2_line_bytes)
+    local = (stored - scattered) / (memory.l1_local_bytes_per_clock or write)
+    cycles: Cycles = events[:, E.LOAD_BYTES] / memory.l1_bytes_per_clock + scattered / write + local
+    return cycles
 
 
 def _l2_cycles(moved: Traffic, machine: Machine) -> float:

@@ -11,6 +11,7 @@ its place, at any moment
   wait for a place.
 
 Then that unit waits again in the first two ways, which are counted already, and has its own ``start + sm + alone``.
+Memory and atomic units beside the SMs can hold instead, and what is in their way is at most half of a unit's own time.
 """
 
 from tilestamp.models.schedule import IN_THE_WAY, Loads, crowd
@@ -30,4 +31,5 @@ def latest_end(units: Loads) -> float:
     own = units.alone + crowd(units) + units.sm + units.start
     turns = float(own.sum()) / units.places if count > units.places else 0.0
     served = float(units.sm.sum()) / min(units.sms, count) + float(units.draws.sum())
-    return (count - 1) * units.interval + served + turns + float(own.max()) + IN_THE_WAY * units.chip
+    end = units.begun + (count - 1) * units.interval + served + turns + float(own.max())
+    return max(end, units.memory + units.way, units.atomic + units.way) + IN_THE_WAY * float(units.alone.mean())

@@ -39,6 +39,8 @@ def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
         term_cycles=terms,
         cycles=cycles,
         milliseconds=cycles / machine.clock_hz * 1e3,
+        low=cycles / machine.clock_hz * 1e3,
+        high=cycles / machine.clock_hz * 1e3,
         bound=max(terms, key=lambda name: terms[name]),
         occupancy=0.0,
         dram_bytes=moved.dram_bytes,

@@ -17,6 +17,7 @@ import msgspec
 import msgspec.structs
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.models.used import note
@@ -138,12 +139,17 @@ def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance,
     ----------
     machine : Machine
     values : mapping
-        Such as ``{"sm.clock_mhz": 1500.0}``.
+        Such as ``{"sm.clock_mhz": 1500.0}``; numbers of NumPy will do. What scales with what:
+        ``models.machine_parts``. Cycles of an instruction are those of a whole warp, so another ``sm.warp_size``
+        changes those that are not given too: lanes a clock stay, and no instruction issues in less than a clock.
     provenance, source : str
         What the new numbers are, and where they come from.
     """
     table = msgspec.to_builtins(machine)
     changes = dict(machine.changes)
+    values = same_lanes(machine.sm.warp_size, machine.issue, machine.pipe, values) | {
+        key: plain_number(value) for key, value in values.items()
+    }
     for key, value in values.items():
         *path, last = key.split(".")
         section = table
@@ -195,14 +201,15 @@ def _plain(table: dict[str, Any], prefix: str, origins: dict[str, tuple[Provenan
 
 
 def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]], file: str) -> Machine:
-    digest = hashlib.sha256(msgspec.json.encode(sections, order="deterministic")).hexdigest()[:16]
-    whole = {"fixed_function": None} | sections | {"provenance": origins, "digest": digest}
+    sections = {name: plain_numbers(values, SECTIONS[name]) for name, values in sections.items()}
+    whole = {"fixed_function": None} | sections | {"provenance": origins, "digest": ""}
     try:
         machine = msgspec.convert(whole, Machine)
     except msgspec.ValidationError as error:
-        raise TilestampError(f"{file}: {str(error).replace('`', '').replace('$.', '')}") from error
+        raise TilestampError(f"{file}: {refusal(str(error), sections, SECTIONS)}") from error
     _check_sense(machine, file)
-    return machine
+    digest = hashlib.sha256(msgspec.json.encode(sections, order="deterministic")).hexdigest()[:16]
+    return msgspec.structs.replace(machine, digest=digest)
 
 
 def _check_keys(table: Any, known: list[str], optional: set[str], what: str, file: str) -> None:

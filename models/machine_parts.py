@@ -1,13 +1,22 @@
-"""The sections of a machine file, a frozen struct each: units in the names, unknown keys refused."""
+"""The sections of a machine file, a frozen struct each: units in the names, unknown keys refused.
+
+What scales with what when one number is changed: a number is one SM's (``sm``, ``issue``, ``pipe``, ``latency``, banks,
+``l1_*``, ``atomics.sm_*``) or the whole chip's (``dram_*``, ``l2_*``, the rest of ``atomics``, ``launch``). More SMs
+bring more of what is an SM's; the chip's stay as they are until they are changed too. Rates a clock and latencies in
+cycles follow ``sm.clock_mhz``; ``dram_gb_per_s``, ``*_ns``, ``*_us`` and ``blocks_per_us`` do not.
+"""
 
 from typing import Annotated, Literal
 
 import msgspec
 
-Count = Annotated[int, msgspec.Meta(ge=1)]
-Size = Annotated[int, msgspec.Meta(ge=0)]
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Amount = Annotated[float, msgspec.Meta(ge=0)]
+MOST_BYTES = 1 << 40
+Count = Annotated[int, msgspec.Meta(ge=1, le=1 << 24)]
+Size = Annotated[int, msgspec.Meta(ge=0, le=MOST_BYTES)]
+Positive = Annotated[float, msgspec.Meta(ge=1e-3, le=1e6)]
+Amount = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+Slot = Annotated[float, msgspec.Meta(ge=1 / 64, le=1e4)]  # cycles of an instruction
+Sms = Annotated[int, msgspec.Meta(ge=1, le=1 << 16)]
 
 
 class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -21,7 +30,7 @@ class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A multiprocessor: schedulers, and what resident blocks share."""
 
-    count: Count
+    count: Sms
     warp_size: Count
     schedulers: Count
     clock_mhz: Positive
@@ -43,23 +52,25 @@ class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Issue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Cycles for which one warp instruction holds its scheduler, by class."""
+    """Cycles for which one warp instruction of ``sm.warp_size`` lanes holds its scheduler, by class."""
 
-    fp32: Amount
-    int32: Amount
-    mul32: Amount
-    sfu: Amount
-    control: Amount
-    shared: Amount
-    load: Amount
-    store: Amount
-    atomic: Amount
-    shared_atomic: Amount
-    barrier: Amount
+    fp32: Slot
+    int32: Slot
+    mul32: Slot
+    sfu: Slot
+    control: Slot
+    shared: Slot
+    load: Slot
+    store: Slot
+    atomic: Slot
+    shared_atomic: Slot
+    barrier: Slot
 
 
 class Pipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Cycles for which one warp instruction holds the execution unit behind its scheduler; 0: never longer than issue.
+
+    ``sm.warp_size`` over these cycles is lanes a clock: ``machine.altered`` keeps those for another warp size.
 
     The units work side by side, so the fullest one counts: fp32, int32 with control, mul32, sfu.
     """
@@ -101,9 +112,8 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
     bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
-    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores of whole lines; 0: the same
-    l1_gather_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for the scattered sectors of a load; 0: the same
-    l1_scatter_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for scattered sectors; 0: the same
+    l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
+    l1_local_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for local memory, in whole lines; 0: the same
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -13,8 +13,10 @@ as there are SMs. A block's first request comes a block start after it got its p
 
 *What it draws from.* An item of a queue begins when the draws before it have passed the fullest atomic unit.
 
-Memory and atomic units of the whole chip are shared by all. While they are not what holds, half of their time is added,
-by the same reasoning: a launch is in step with itself, and its units want them together.
+Then three things go on side by side: this schedule of the SMs, the bytes of DRAM or L2 (the fuller), and the atomic
+units of the chip. The longest holds. A launch is in step with itself as it begins, so its units want the other two
+together, and by the same reasoning half is waited for: half of the smaller of what holds and the others, at most of a
+unit's own time, since units fall out of step as they end.
 
 So the time is a sum, a maximum or the lowest of a list of costs all the way: **no cost that falls makes it longer, and
 a cost that changes by 1 % changes it by at most 1 %** (it is monotone, and of the first degree in all costs together).
@@ -73,8 +75,12 @@ class Loads(NamedTuple):
         Cycles from one start to the next; 0 where units are drawn from a queue.
     start : float
         Cycles from a free place to the first instruction of the block put there; 0 where units are drawn.
-    chip : float
-        Cycles of the fuller of DRAM and L2, and of the atomic units.
+    begun : float
+        Cycles before persistent blocks draw their first units.
+    memory, atomic : float
+        Cycles of the fuller of DRAM and L2, and of the atomic units; draws are not among them.
+    way : float
+        Cycles before their first request and after their last.
     """
 
     sm: NDArray[np.float64]
@@ -84,7 +90,10 @@ class Loads(NamedTuple):
     sms: int
     interval: float
     start: float
-    chip: float
+    begun: float
+    memory: float
+    atomic: float
+    way: float
 
 
 def loads(asked: Asked) -> Loads:
@@ -93,7 +102,7 @@ def loads(asked: Asked) -> Loads:
     blocks = launch.dispatch == "blocks"
     places = slots(launch, machine, asked.held)
     sm = np.maximum(np.maximum(units.issue, units.shared), units.l1)
-    atomic = asked.terms["atomic"] if not blocks else max(asked.terms["atomic"], asked.terms["queue"])
+    start = machine.latency.block_launch_cycles if len(sm) else 0.0
     return Loads(
         sm=sm,
         alone=np.maximum(np.maximum(units.alone, sm), 1.0),
@@ -101,34 +110,45 @@ def loads(asked: Asked) -> Loads:
         places=int(places.sum()),
         sms=max(1, int(np.count_nonzero(places))),
         interval=asked.terms["start"] / max(1, len(sm)),
-        start=machine.latency.block_launch_cycles if blocks else 0.0,
-        chip=min(max(asked.terms["dram"], asked.terms["l2"]) + atomic, float(units.alone.mean()) if len(sm) else 0.0),
+        start=start if blocks else 0.0,
+        begun=0.0 if blocks else start,
+        memory=max(asked.terms["dram"], asked.terms["l2"]),
+        atomic=max(asked.terms["atomic"], asked.terms["queue"] if blocks else 0.0),
+        way=float(units.chain.min()) if len(sm) else 0.0,
     )
-
-
-def start_up(asked: Asked) -> float:
-    """Cycles before a persistent block draws its first unit; each block of a grid has its own in its chain."""
-    persistent = asked.launch.dispatch != "blocks" and len(asked.units.alone)
-    return asked.machine.latency.block_launch_cycles if persistent else 0.0
 
 
 def played(asked: Asked, units: Loads) -> Timing:
     """Price what was asked."""
-    terms, begun = asked.terms, start_up(asked)
+    terms = asked.terms
     least = longest(terms, asked.units)
     end, started, waited = ends(units)
-    waited += IN_THE_WAY * units.chip
-    cycles = max(begun + end + IN_THE_WAY * units.chip, least)
-    tail = max(0.0, cycles - begun - started)
+    whole, in_step = together(units, units.begun + end)
+    cycles = max(whole, least)
+    tail = max(0.0, cycles - units.begun - started)
     return timing(
         asked,
         terms["launch"] + cycles,
         _holds(terms, cycles, tail, units.sms < asked.machine.sm.count),
         "schedule",
-        (terms["launch"] + max(least, cycles - waited), terms["launch"] + cycles + waited),
+        (terms["launch"] + max(least, cycles - waited - in_step), terms["launch"] + cycles + waited + in_step),
         busy_sms=float(min(len(units.alone), units.sms)),
         tail_cycles=tail,
     )
+
+
+def together(units: Loads, end: float) -> tuple[float, float]:
+    """Cycles of the SMs' schedule, memory and atomic units side by side; how many of them the others are in the way."""
+    if not end:
+        return 0.0, 0.0
+    own, served = float(units.alone.mean()), float(units.sm.sum()) / units.sms
+    sides = (
+        (end, 0.0, units.memory + units.atomic),
+        (units.memory, units.way, units.atomic + served),
+        (units.atomic, units.way, units.memory + served),
+    )
+    waits = [IN_THE_WAY * min(time, others, own) for time, _, others in sides]
+    return max((time + trip + wait, wait) for (time, trip, _), wait in zip(sides, waits, strict=True))
 
 
 def ends(units: Loads) -> tuple[float, float, float]:
@@ -136,7 +156,7 @@ def ends(units: Loads) -> tuple[float, float, float]:
     extra = crowd(units)
     crowded = _ends(units, units.alone + extra, units.places)
     last = crowded[2]
-    waited = float(extra[last : last + 1].sum() + extra[:last].sum() / units.places)
+    waited = float(extra[last] + extra[:last].sum() / units.places) if len(extra) else 0.0
     if waited and units.alone.sum() / units.sms < crowded[0]:
         lonely = _ends(units, units.alone, units.sms)
         if lonely[0] < crowded[0]:

@@ -30,3 +30,12 @@ class Simt(NamedTuple):
     sms: int = 132  # persistent kernels launch this many blocks
     bank_bytes: int = 4  # that a bank of shared memory serves a pass: 8 on 3.x
     bank_mode_bytes: int = 4  # consecutive words of this size lie in consecutive banks: 4 or 8 on 3.x
+
+    def differences(self, other: "Simt", *, persistent: bool) -> list[str]:
+        """Say what is counted otherwise on another machine; the number of SMs only for ``persistent`` kernels."""
+        pairs = zip(self._fields, self, other, strict=True)
+        return [
+            f"{name} {ours} and {theirs}"
+            for name, ours, theirs in pairs
+            if ours != theirs and (persistent or name != "sms")
+        ]

@@ -27,6 +27,8 @@ class Timing:
     low, high : float
         Milliseconds between which units that are in each other's way less or more often than expected put the launch
         (see ``models.schedule``); the same number where nothing spreads. It is no error of the model.
+    residency : str
+        Blocks that an SM holds, and what keeps out one more: where that number changes, a time may step.
     why : str
         Why ``auto`` chose it.
     error_bound : float
@@ -47,6 +49,7 @@ class Timing:
     fidelity: str = ""
     low: float = float("nan")
     high: float = float("nan")
+    residency: str = ""
     why: str = ""
     error_bound: float = float("nan")
 

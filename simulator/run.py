@@ -45,7 +45,7 @@ class Run:
     note: str = ""
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
-    """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
+    """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds``: of CPU time, for that."""
     counted: bool = True
     """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
 
@@ -205,8 +205,20 @@ class Run:
         return self.intervals["frame", "milliseconds"]
 
     def on(self, machine: Machine | str | Path, fidelity: Fidelity | None = None) -> "Run":
-        """Price the same work on another machine (of the same SIMT shape for counts to be its own)."""
-        return replace(self, machine=load_machine(machine), fidelity=fidelity or self.fidelity)
+        """Price the same work on another machine.
+
+        Raises
+        ------
+        TilestampError
+            A machine on which the work would have been counted otherwise: another warp size, coalescing, banks or
+            merging of atomics; another number of SMs, where a kernel launched a block for each.
+        """
+        machine = load_machine(machine)
+        persistent = any(isinstance(work, Work) and work.dispatch != "blocks" for work in self.frame.works)
+        if differences := self.machine.simt.differences(machine.simt, persistent=persistent):
+            told = ", ".join(differences)
+            raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")
+        return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
 
     def manifest(self) -> dict[str, Any]:
         """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""

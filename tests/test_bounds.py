@@ -240,3 +240,11 @@ def test_an_unknown_fidelity_is_refused():
 def test_a_stream_that_touches_nothing_moves_nothing():
     asked = Stream("records", "load", 64, 0, asked_bytes=64)
     assert traffic([launch(streams=[asked])], H200)[0].l2_bytes == 0
+
+
+def test_whole_lines_of_local_memory_are_stored_faster_than_scattered_sectors():
+    """Bytes stored beyond those of transactions went to local memory."""
+    scattered = terms(H200, units=132, STORE_BYTES=3200, STORE_TRANSACTIONS=100)["l1"]
+    both = terms(H200, units=132, STORE_BYTES=3200 + 664, STORE_TRANSACTIONS=100)["l1"]
+    assert scattered == pytest.approx(3200 / 15.9)
+    assert both - scattered == pytest.approx(664 / 31.8)

@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from tilestamp import simulate
@@ -168,3 +169,38 @@ def test_a_what_if_has_another_digest():
 def test_a_what_if_of_an_unknown_number_is_refused():
     with pytest.raises(TilestampError, match=r"did you mean 'sm\.clock_mhz'"):
         altered(load_machine("gtx280"), {"sm.clok_mhz": 1.0}, "assumed", "test")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("sm.count", 10**9, "sm.count is 1000000000, and no machine has that: it is a whole number from 1 to 65,536"),
+        ("memory.dram_gb_per_s", float("inf"), "memory.dram_gb_per_s is inf, .* a number from 0.001 to 1,000,000"),
+        ("sm.clock_mhz", float("nan"), "sm.clock_mhz is nan"),
+        ("issue.fp32", 0, "issue.fp32 is 0, .* from 0.015625 to 10,000"),
+        ("sm.schedulers", 1.5, "sm.schedulers is 1.5, .* a whole number"),
+    ],
+)
+def test_a_number_that_no_machine_has_is_refused_with_its_range(key, value, said):
+    with pytest.raises(TilestampError, match=said):
+        altered(load_machine("gtx280"), {key: value}, "assumed", "test")
+
+
+def test_numbers_of_numpy_and_whole_floats_are_numbers():
+    values = {"sm.count": np.int64(31), "sm.clock_mhz": np.float32(1300), "sm.max_warps": 32.0}
+    machine = altered(load_machine("gtx280"), values, "assumed", "test")
+    assert (machine.sm.count, machine.sm.clock_mhz, machine.sm.max_warps) == (31, 1300.0, 32)
+    assert (
+        machine.digest
+        == altered(load_machine("gtx280"), {"sm.count": 31, "sm.clock_mhz": 1300.0}, "assumed", "test").digest
+    )
+
+
+def test_a_warp_of_another_size_issues_as_many_lanes_a_clock():
+    """Eight lanes a clock on a GTX 280; on an H200 no warp instruction issues in less than a clock."""
+    shape = {"sm.warp_size": 16, "memory.bank_lanes": 16}
+    old, new = (altered(load_machine(name), shape, "assumed", "test") for name in ("gtx280", "h200"))
+    assert (old.issue.fp32, old.pipe.sfu) == (2.0, 8.0)
+    assert (new.issue.fp32, new.pipe.sfu) == (1.0, 8.013 / 2)
+    given = altered(load_machine("gtx280"), {"sm.warp_size": 16, "issue.fp32": 3.0}, "assumed", "test")
+    assert (given.issue.fp32, given.issue.int32) == (3.0, 2.0)

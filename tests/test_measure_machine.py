@@ -2,11 +2,13 @@
 
 import importlib.util
 
+import numpy as np
 import pytest
 
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.validation.machine_file import busy, machine_file
 from tilestamp.experiments.validation.measuring import Number
+from tilestamp.experiments.validation.measuring_sm import SENT, between
 from tilestamp.models.machine import load_machine
 
 H200 = load_machine("h200")
@@ -56,3 +58,16 @@ def test_without_cupy_one_sentence_says_what_to_install(command, capsys, monkeyp
 def test_a_file_that_is_no_toml_is_refused_before_anything_runs(capsys):
     assert run_command(["measure-machine", "-o", "mine.txt"]) == 2
     assert "ends in .toml" in capsys.readouterr().err
+
+
+def test_a_block_follows_the_one_before_it_on_its_own_sm():
+    rows = np.array([[1, 500, 600, 0], [0, 100, 200, 0], [0, 515, 700, 0], [1, 100, 190, 0], [0, 1000, 1100, 0]])
+    assert between(rows).tolist() == [315, 300, 310]
+
+
+def test_what_one_sm_sends_is_apart_from_what_the_chip_takes():
+    for key in SENT:
+        section, name = key.split(".")
+        assert getattr(getattr(H200, section), name) > 0
+        assert H200.provenance[key][0] == "measured"
+    assert H200.atomics.sm_requests_per_clock * H200.sm.count > H200.atomics.requests_per_clock

@@ -52,9 +52,9 @@ def areas() -> tuple[float, ...]:
 
 
 @remembered
-def draw(area: float) -> tuple[Run, int]:
-    """Draw one area; give the run without its picture, and its triangles."""
-    machine = load_machine(MACHINE)
+def draw(area: float, name: str = MACHINE) -> tuple[Run, int]:
+    """Draw one area on a machine; give the run without its picture, and its triangles."""
+    machine = load_machine(name)
     scene = Scene.sweep(area, WIDTH, HEIGHT)
     options = CudarasterOptions(mode="color")
     frame = cudaraster(scene, np.eye(4), WIDTH, HEIGHT, machine.simt, options, Executor())

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from tilestamp.experiments.validation.gpu import cupy
 from tilestamp.experiments.validation.measuring import Number, arithmetic, attribute, clock, device, latencies
 from tilestamp.experiments.validation.measuring_memory import atomics, bandwidths, launches
+from tilestamp.experiments.validation.measuring_sm import one_sm
 from tilestamp.models.errors import TilestampError
 
 NEEDED_BYTES = 3 << 30
@@ -29,4 +30,5 @@ def measure() -> Iterator[Number]:
     yield from latencies()
     yield from bandwidths(sms, frequency.value)
     yield from atomics(sms, frequency.value)
+    yield from one_sm(sms)
     yield from launches()

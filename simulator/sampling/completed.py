@@ -27,7 +27,7 @@ def completed(run: Run, execute: SampledExecutor) -> Run:
         sure = run.milliseconds_interval.relative <= run.error
         execute.spent += time.process_time() - begin
         run = run if sure else _finished(run, execute)
-    run.sampled["seconds_saved"] = execute.seconds_saved
+    run.sampled["seconds"] = execute.spent
     return run
 
 

@@ -39,19 +39,16 @@ class Part:
     inputs : dict
         By name.
     sample : Sample
-    seconds : float
-        CPU seconds that running them took.
     """
 
     stage: Any
     inputs: dict[str, Any]
     sample: Sample
-    seconds: float = 0.0
     outputs: Any = None  # of the last units that ran
 
     def grow(self, taken: Integers) -> None:
         """Run the units that ``taken`` has more than the sample."""
-        strata, begin = self.sample.strata, time.process_time()
+        strata = self.sample.strata
         old, new = drawn(strata, self.sample.taken), drawn(strata, taken)
         fresh = np.setdiff1d(new, old)
         self.outputs, rows = self.stage.run(**self.inputs, units=fresh)
@@ -60,13 +57,6 @@ class Part:
         if len(old):
             table[old] = self.sample.rows
         self.sample = replace(self.sample, taken=taken, rows=table[new])
-        self.seconds += time.process_time() - begin
-
-    @property
-    def seconds_of_all(self) -> float:
-        """CPU seconds that all units would take, if they cost alike by size."""
-        size = self.sample.strata.known[:, 1]
-        return self.seconds * float(size.sum() / size[drawn(self.sample.strata, self.sample.taken)].sum())
 
     def work(self) -> Work:
         """Work of all units: as they ran, or as those that ran foretell."""
@@ -140,11 +130,6 @@ class SampledExecutor(Executor):
         work = part.work()
         self.spent += time.process_time() - begin
         return work
-
-    @property
-    def seconds_saved(self) -> float:
-        """CPU seconds that all units would have taken, had they cost alike by size, less those of the samples."""
-        return sum(part.seconds_of_all for part in self.parts.values()) - self.spent
 
     @property
     def units(self) -> dict[str, tuple[int, int]]:
