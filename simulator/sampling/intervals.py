@@ -15,7 +15,8 @@ from tilestamp.simulator.sampling.totals import totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 STEP = 0.02  # by which a slope of the time is found
-LEAST = 0.001  # of a time: which units are neighbours in a launch, a sample does not tell (chosen on teapot and spot)
+LEAST = 0.001  # of a time, and ...
+BEYOND = 0.015  # ... of what is beyond its longest term: which units follow each other no sample tells (measured)
 
 
 def add(estimates: Sequence[Estimate]) -> Estimate:
@@ -74,7 +75,9 @@ def milliseconds(
     slope = abs(price(1 + STEP) - timing.milliseconds) / STEP
     found = totals(sample, _costs(sampled, machine))
     unsure = found.half_width[found.value > 0] / found.value[found.value > 0]
-    return around(timing.milliseconds, slope * float(unsure.max(initial=0.0)) + LEAST * timing.milliseconds)
+    roof = max(cycles for name, cycles in timing.term_cycles.items() if name != "launch")
+    unseen = LEAST + BEYOND * max(0.0, 1.0 - roof / timing.cycles)
+    return around(timing.milliseconds, slope * float(unsure.max(initial=0.0)) + unseen * timing.milliseconds)
 
 
 def _costs(launch: Launch, machine: Machine) -> Floats:
