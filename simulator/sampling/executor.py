@@ -23,6 +23,7 @@ from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 BYTES = ("LOAD_BYTES", "STORE_BYTES")
+UNITS_AN_SM = 64  # below, the time depends on single units, whose neighbours no sample tells
 PAYS = 0.5  # seconds of a stage, from which on drawing and pricing a sample takes less than half of it
 
 P = ParamSpec("P")
@@ -96,7 +97,7 @@ class SampledExecutor(Executor):
         """Run part of a stage's units: enough that all that the run asks for is known within the error."""
         begin, named = time.process_time(), stage.inputs(*inputs, **options)
         known = stage.known(**named)
-        if known.seconds < PAYS:
+        if known.seconds < PAYS or len(known.size) < UNITS_AN_SM * self.machine.sm.count:
             self.too_small = True
             return self(stage, *inputs, **options)
         strata = make_strata(known.size, [self.seed, len(self.parts)], *known.more)
