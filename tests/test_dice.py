@@ -13,8 +13,7 @@ from tilestamp.simulator.scenes import LookAt, load_scene
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches, bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
-from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped
-from tilestamp.simulator.stages.eisenacher2010.snap_edges import _works as snap_works
+from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, snap_works
 
 GTX280 = Simt(warp=32, coalescing=Coalescing.HALF_WARP_SEGMENTS, banks=16, bank_lanes=16)
 VIEW = LookAt((1.0, -5.0, 2.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 40.0, 0.1, 50.0)

@@ -8,7 +8,7 @@ A pipeline is a function that bears its module's name, and a struct of its optio
 import inspect
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 from tilestamp.models.errors import TilestampError
@@ -20,7 +20,7 @@ Pipeline = Callable[..., Frame]
 
 def pipeline_names() -> list[str]:
     """Names of all pipelines, as a user writes them (``across-polygons``)."""
-    return sorted(path.stem.replace("_", "-") for path in Path(__file__).parent.glob("[a-z]*.py"))
+    return sorted(module.name.replace("_", "-") for module in iter_modules(__path__) if not module.name.startswith("_"))
 
 
 def load_pipeline(name: str) -> Pipeline:

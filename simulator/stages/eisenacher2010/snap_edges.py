@@ -109,10 +109,13 @@ def snap_edges(
                 touched[fine[known]] = True
                 fine, other, other_edge, along = (a[~known] for a in (fine, other, other_edge, along))
     snapped = Snapped(Grids(vertices, _boxes(vertices)), touched, lookups)
-    return StageResult(snapped, _works(snapped, subpatches.patch, len(points), simt, textured))
+    return StageResult(snapped, snap_works(snapped, subpatches.patch, len(points), simt, textured))
 
 
-def _works(snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, textured: bool) -> tuple[Work, ...]:
+def snap_works(
+    snapped: Snapped, patch: NDArray[np.int32], patches: int, simt: Simt, textured: bool
+) -> tuple[Work, ...]:
+    """Work of the look-ups, and of dicing the sub-patches that were touched once more."""
     if not snapped.touched.any():
         return ()
     starts = np.arange(0, len(snapped.touched), BLOCK)
