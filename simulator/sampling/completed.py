@@ -19,7 +19,9 @@ def completed(run: Run, execute: SampledExecutor) -> Run:
         Which ran its frame.
     """
     if not execute.parts:
-        why = "a sample would cost more, or tell too little" if execute.too_small else f"{run.pipeline} cannot be sampled"
+        why = (
+            "a sample would cost more, or tell too little" if execute.too_small else f"{run.pipeline} cannot be sampled"
+        )
         return _noted(run, f"everything ran: {why}")
     run = replace(run, sampled={"units": execute.units})
     if run.fidelity != "counts":
