@@ -21,8 +21,7 @@ from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
-from tilestamp.simulator.sampling.estimate import Estimate, Floats
-from tilestamp.simulator.sampling.expansion import left
+from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
@@ -46,7 +45,7 @@ class Run:
     note: str = ""
     error: float = 0.0
     sampled: dict[str, Any] = field(default_factory=dict)
-    """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds_saved``: CPU seconds, estimated."""
+    """Empty where everything ran. ``units``: (executed, all) by kernel; ``seconds``: of CPU time, for that."""
     counted: bool = True
     """Whether the machine's work was counted: with ``counting=False`` there is a picture, and nothing to price."""
 
@@ -155,7 +154,12 @@ class Run:
         if isinstance(work, Work) and isinstance(launch, Launch):
             ran = self._ran(work)
             known["instructions"] = intervals.instructions(work, launch, ran)
-            known["milliseconds"] = intervals.milliseconds(timing, work, partial(self._changed, index))
+            changed = partial(self._changed, index)
+            known["milliseconds"] = (
+                intervals.exactly(timing.milliseconds)
+                if ran is None
+                else intervals.milliseconds(timing, work, ran, self.machine, changed)
+            )
         else:
             known["milliseconds"] = intervals.exactly(timing.milliseconds)
         return known
@@ -166,14 +170,14 @@ class Run:
             return None
         return self._launch(replace(work, table=work.sample.sampled, streams=(), atomic_requests=None))
 
-    def _changed(self, index: int, change: Floats) -> float:
-        """Milliseconds of the ``index``-th launch, were the rows of its units that did not run others."""
+    def _changed(self, index: int, factor: float) -> float:
+        """Milliseconds of the ``index``-th launch, were all that is estimated ``factor`` times as large."""
         work, launch, moved = self.frame.works[index], self.launches[index], self._traffic[index]
         assert isinstance(work, Work) and isinstance(launch, Launch) and work.sample is not None  # noqa: S101, PT018
-        events, rest = launch.events.copy(), left(work.sample)
+        change = work.table * (factor - 1)
+        change[:, list(work.sample.exact)] = 0.0
         priced = self._launch(replace(work, table=change, streams=()))  # type: ignore[arg-type]  # events are linear
-        events[rest] = np.maximum(events[rest] + priced.events, 0.0)
-        launch = replace(launch, events=events)
+        launch = replace(launch, events=launch.events + priced.events)
         if work.sample.streams is not None:
             launch = replace(launch, streams=work.sample.streams(change.sum(axis=0)))
             launches = [*self.launches[:index], launch, *self.launches[index + 1 :]]

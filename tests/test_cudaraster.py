@@ -127,6 +127,7 @@ def test_a_first_frame_executes_the_stages_of_attempts_that_fail(monkeypatch):
 def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
     monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
     monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.UNITS_AN_SM", 0)
     run = simulate(
         soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5, first_frame=True
     )

@@ -20,6 +20,7 @@ MICRO = {"width": 320, "height": 240, "bound": 3}
 def small_frames(monkeypatch):
     """Sample frames that are too small to be worth it."""
     monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.UNITS_AN_SM", 0)
 
 
 def population(kind: str, units: int = 3000) -> tuple[np.ndarray, np.ndarray]:
@@ -176,7 +177,7 @@ def test_all_stages_but_the_last_run_in_full():
     assert part[-1].streams == full[-1].streams  # lists and stores are known
 
 
-@pytest.mark.parametrize(("pipeline", "machine"), [("micropolygon", "h200"), ("cudaraster", "gtx480")])
+@pytest.mark.parametrize(("pipeline", "machine"), [("micropolygon", "gtx680"), ("cudaraster", "gtx480")])
 def test_intervals_hold_the_full_run_on_a_small_frame(pipeline, machine, monkeypatch):
     """29 of 30 times at least; the table of all machines is ``tests.benchmarks.interval_coverage``."""
     monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)

@@ -19,7 +19,9 @@ def completed(run: Run, execute: SampledExecutor) -> Run:
         Which ran its frame.
     """
     if not execute.parts:
-        why = "a sample would cost more" if execute.too_small else f"{run.pipeline} cannot be sampled"
+        why = (
+            "a sample would cost more, or tell too little" if execute.too_small else f"{run.pipeline} cannot be sampled"
+        )
         return _noted(run, f"everything ran: {why}")
     run = replace(run, sampled={"units": execute.units})
     if run.fidelity != "counts":
@@ -27,7 +29,7 @@ def completed(run: Run, execute: SampledExecutor) -> Run:
         sure = run.milliseconds_interval.relative <= run.error
         execute.spent += time.process_time() - begin
         run = run if sure else _finished(run, execute)
-    run.sampled["seconds_saved"] = execute.seconds_saved
+    run.sampled["seconds"] = execute.spent
     return run
 
 

@@ -23,6 +23,7 @@ from tilestamp.simulator.work import Work
 
 ROUNDS = 6  # enlargements at most; then everything runs
 BYTES = ("LOAD_BYTES", "STORE_BYTES")
+UNITS_AN_SM = 64  # below, the time depends on single units, whose neighbours no sample tells
 PAYS = 0.5  # seconds of a stage, from which on drawing and pricing a sample takes less than half of it
 
 P = ParamSpec("P")
@@ -39,19 +40,16 @@ class Part:
     inputs : dict
         By name.
     sample : Sample
-    seconds : float
-        CPU seconds that running them took.
     """
 
     stage: Any
     inputs: dict[str, Any]
     sample: Sample
-    seconds: float = 0.0
     outputs: Any = None  # of the last units that ran
 
     def grow(self, taken: Integers) -> None:
         """Run the units that ``taken`` has more than the sample."""
-        strata, begin = self.sample.strata, time.process_time()
+        strata = self.sample.strata
         old, new = drawn(strata, self.sample.taken), drawn(strata, taken)
         fresh = np.setdiff1d(new, old)
         self.outputs, rows = self.stage.run(**self.inputs, units=fresh)
@@ -60,13 +58,6 @@ class Part:
         if len(old):
             table[old] = self.sample.rows
         self.sample = replace(self.sample, taken=taken, rows=table[new])
-        self.seconds += time.process_time() - begin
-
-    @property
-    def seconds_of_all(self) -> float:
-        """CPU seconds that all units would take, if they cost alike by size."""
-        size = self.sample.strata.known[:, 1]
-        return self.seconds * float(size.sum() / size[drawn(self.sample.strata, self.sample.taken)].sum())
 
     def work(self) -> Work:
         """Work of all units: as they ran, or as those that ran foretell."""
@@ -106,7 +97,7 @@ class SampledExecutor(Executor):
         """Run part of a stage's units: enough that all that the run asks for is known within the error."""
         begin, named = time.process_time(), stage.inputs(*inputs, **options)
         known = stage.known(**named)
-        if known.seconds < PAYS:
+        if known.seconds < PAYS or len(known.size) < UNITS_AN_SM * self.machine.sm.count:
             self.too_small = True
             return self(stage, *inputs, **options)
         strata = make_strata(known.size, [self.seed, len(self.parts)], *known.more)
@@ -140,11 +131,6 @@ class SampledExecutor(Executor):
         work = part.work()
         self.spent += time.process_time() - begin
         return work
-
-    @property
-    def seconds_saved(self) -> float:
-        """CPU seconds that all units would have taken, had they cost alike by size, less those of the samples."""
-        return sum(part.seconds_of_all for part in self.parts.values()) - self.spent
 
     @property
     def units(self) -> dict[str, tuple[int, int]]:

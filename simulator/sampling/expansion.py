@@ -1,10 +1,8 @@
 """Rows of all units from those that ran: what is foretold of the others, and what units like them missed."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from tilestamp.simulator.sampling.estimate import Floats, Integers
+from tilestamp.simulator.sampling.estimate import Integers
 from tilestamp.simulator.sampling.strata import Sample, drawn, places
 from tilestamp.simulator.sampling.totals import fit_rows, product, totals
 
@@ -19,9 +17,9 @@ def expanded(sample: Sample) -> Integers:
     table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
     table[drawn(strata, taken)] = sample.rows
     if not sample.complete:
-        values, rest = sample.rows.astype(np.float64), left(sample)
+        values, rest = sample.rows.astype(np.float64), _left(sample)
         fit = fit_rows(sample, values)
-        rows = product(strata.known[rest], fit.factors) + fit.residual[_donors(sample)]
+        rows = product(strata.known[rest], fit.factors) + fit.residual[_nearest(sample)]
         np.maximum(rows, 0.0, out=rows)
         sums, goal = rows.sum(axis=0), totals(sample, values).value - values.sum(axis=0)
         rows *= np.where(sums > 0, np.maximum(goal, 0.0) / np.where(sums > 0, sums, 1.0), 0.0)
@@ -32,7 +30,7 @@ def expanded(sample: Sample) -> Integers:
     return table
 
 
-def left(sample: Sample) -> Integers:
+def _left(sample: Sample) -> Integers:
     """Units that did not run, stratum after stratum."""
     ran = np.zeros(len(sample.strata.order), np.bool_)
     ran[places(sample.strata, sample.taken)] = True
@@ -40,20 +38,8 @@ def left(sample: Sample) -> Integers:
     return units
 
 
-def _donors(sample: Sample, random: np.random.Generator | None = None) -> Integers:
-    """For each unit of ``left`` the row of one that ran in its stratum: the nearest, or one of a bootstrap sample."""
-    taken, rest = sample.taken, sample.strata.units - sample.taken
-    first = np.cumsum(taken) - taken
-    many, start = np.repeat(taken, rest), np.repeat(first, rest)
-    if random is None:
-        return _nearest(sample)
-    again = np.repeat(first, taken) + (random.random(taken.sum()) * np.repeat(taken, taken)).astype(np.int64)
-    donors: Integers = again[start + (random.random(len(many)) * many).astype(np.int64)]
-    return donors
-
-
 def _nearest(sample: Sample) -> Integers:
-    """For each unit of ``left`` the row of the last before it in launch order that ran in its stratum, or the first."""
+    """For each unit of ``_left`` the row of the last before it, in launch order, that ran in its stratum."""
     strata, rows = sample.strata, np.cumsum(sample.taken) - sample.taken
     found = []
     for first, end, taken, row in zip(strata.first[:-1], strata.first[1:], sample.taken, rows, strict=True):
@@ -62,22 +48,3 @@ def _nearest(sample: Sample) -> Integers:
         found.append(row + ascending[np.searchsorted(ran[ascending], rest).clip(1, taken) - 1] if len(rest) else rest)
     donors: Integers = np.concatenate(found)
     return donors
-
-
-def replicas(sample: Sample, values: Floats, count: int) -> Iterator[Floats]:
-    """Changes that make the values of the units of ``left`` those of other samples like this one, (units left, k) each.
-
-    A bootstrap within strata, and for each unit left the miss of one unit of it at random: totals then vary as those
-    of samples do, and single units as units do.
-
-    Parameters
-    ----------
-    sample : Sample
-    values : ndarray, (units that ran, k), float64
-    count : int
-    """
-    fit, plain = fit_rows(sample, values), _donors(sample)
-    few = np.repeat(np.sqrt(sample.taken / np.maximum(sample.taken - 1, 1)), sample.taken)[:, None]
-    wide = np.repeat(fit.mean, sample.taken, axis=0) + fit.apart * few
-    for replica in range(count):
-        yield wide[_donors(sample, np.random.default_rng(replica))] - fit.residual[plain]

@@ -4,16 +4,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from tilestamp.models.demand import demand
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
+from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.sampling.estimate import Estimate, Floats, t_quantile
-from tilestamp.simulator.sampling.expansion import replicas
+from tilestamp.models.traffic import Traffic
+from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.sampling.totals import totals
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
-LEAST = 5e-4  # of a time: no half-width below it is claimed, for single units beside the longest weigh more than others
-REPLICAS = 8  # samples like the one drawn, whose times are compared
+STEP = 0.02  # by which a slope of the time is found
+LEAST = 0.001  # of a time, and ...
+BEYOND = 0.015  # ... of what is beyond its longest term: which units follow each other no sample tells (measured)
 
 
 def add(estimates: Sequence[Estimate]) -> Estimate:
@@ -51,21 +54,34 @@ def instructions(work: Work, launch: Launch, sampled: Launch | None) -> Estimate
     return around(value, float(totals(work.sample, ran).half_width[0]))
 
 
-def milliseconds(timing: Timing, work: Work, price: Callable[[Floats], float]) -> Estimate:
-    """Time of one launch: as sure as the times of samples like this one are alike.
+def milliseconds(
+    timing: Timing, work: Work, sampled: Launch, machine: Machine, price: Callable[[float], float]
+) -> Estimate:
+    """Time of one launch, by the delta method: it is a smooth function of costs, and the least sure one counts for all.
 
     Parameters
     ----------
     timing : Timing
     work : Work
+    sampled : Launch
+        The units that ran, without what is known of all.
+    machine : Machine
     price : callable
-        Milliseconds, were the rows of the units that did not run changed by (units, events).
+        Milliseconds, were all that is estimated larger by a factor.
     """
     sample = work.sample
     if sample is None or sample.complete or not np.isfinite(timing.milliseconds):
         return exactly(timing.milliseconds)
-    changes = replicas(sample, sample.sampled.astype(np.float64), REPLICAS)
-    square = np.mean([(price(change) - timing.milliseconds) ** 2 for change in changes])
-    quantile = t_quantile(np.full(1, REPLICAS, np.float64))[0]
-    half = max(float(quantile * np.sqrt(square)), LEAST * timing.milliseconds)
-    return around(timing.milliseconds, half)
+    slope = abs(price(1 + STEP) - timing.milliseconds) / STEP
+    found = totals(sample, _costs(sampled, machine))
+    unsure = found.half_width[found.value > 0] / found.value[found.value > 0]
+    roof = max(cycles for name, cycles in timing.term_cycles.items() if name != "launch")
+    unseen = LEAST + BEYOND * max(0.0, 1.0 - roof / timing.cycles)
+    return around(timing.milliseconds, slope * float(unsure.max(initial=0.0)) + unseen * timing.milliseconds)
+
+
+def _costs(launch: Launch, machine: Machine) -> Floats:
+    """Cycles and bytes of the units of a launch that the time of the whole may depend on."""
+    asked = demand(launch, machine, Traffic(0.0, 0.0, 1.0))
+    start = machine.latency.block_launch_cycles if launch.dispatch == "blocks" else 0.0
+    return np.stack([asked.issue, asked.shared, asked.l1, asked.chain - start], axis=1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tilestamp.models.launch import Stream
 from tilestamp.simulator.sampling.estimate import Floats, Integers
 
-CERTAIN = 24  # largest units, always executed
+CERTAIN = 24  # largest units by each thing known, always executed
 STEP = 1.3  # largest ratio of sizes in a stratum
 FEWEST = 12  # units of a stratum: a smaller one is joined with its neighbour
 PILOT = 200  # units that the first sample draws in proportion to size, and ...
@@ -104,8 +104,8 @@ def make_strata(size: NDArray[np.generic], seed: list[int], *more: NDArray[np.ge
     columns = [np.ones(len(size)), *(column.astype(np.float64) for column in (size, *more))]
     known = np.stack([column / (column.mean() or 1.0) for column in columns], axis=1)
     ascending = np.argsort(known[:, 1], kind="stable")
-    split = max(0, len(known) - CERTAIN)
-    rest, certain = ascending[:split], ascending[split:]
+    certain = np.unique(np.argsort(known[:, 1:], axis=0, kind="stable")[-CERTAIN:])
+    rest = ascending[~np.isin(ascending, certain)]
     cuts = _cuts(known[rest, 1])
     random = np.random.default_rng(seed)
     parts = [certain, *(random.permutation(part) for part in np.split(rest, cuts) if len(part))]

@@ -22,7 +22,7 @@ from tilestamp.simulator.scenes import load_scene, read_camera
 
 MACHINES = ("gtx280", "gtx480", "gtx680", "h200")
 PIPELINES: dict[str, dict[str, Any]] = {"micropolygon": {"bound": 3}, "cudaraster": {"msaa": 4}}
-SIZE = 640, 480
+SIZE = 1024, 768
 SEEDS = 40
 ERROR = 0.05
 
@@ -90,6 +90,8 @@ def _held(full: Run, recorded: Recorded, seeds: range) -> Iterator[tuple[bool, f
     for seed in seeds:
         execute = sampling.SampledExecutor(ERROR, seed, full.pipeline, full.machine)
         execute.last(recorded)  # type: ignore[arg-type]
+        if not execute.parts:
+            raise ValueError("everything runs: too few units for the machine")
         ((ran, units),) = execute.units.values()
         run = replace(full, frame=replace(full.frame, works=execute.works), sampled={"units": execute.units})
         time = run.milliseconds_interval
@@ -105,7 +107,10 @@ def main(scenes: list[str]) -> None:
             for machine in MACHINES:
                 try:
                     c = coverage(pipeline, machine, scene)
-                except TilestampError as refused:  # triangles alone, or a machine that the original cannot use
+                except (
+                    TilestampError,
+                    ValueError,
+                ) as refused:  # triangles alone, or a machine that the original cannot use
                     sys.stdout.write(f"{scene:14} {pipeline:13} {machine:7} {refused}\n")
                     continue
                 sys.stdout.write(

@@ -161,9 +161,11 @@ def draw_tile(
         draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
 
 
-def new_buffers(width: int, height: int, samples: int = 1) -> FrameBuffers:
-    """Allocate the pixels of a frame, whole tiles, cleared to black and far."""
+def new_buffers(width: int, height: int, samples: int = 1, *, cleared: bool = True) -> FrameBuffers:
+    """Allocate the pixels of a frame, whole tiles, cleared to black and far where asked for."""
     shape = (samples, -(-height // TILE) * TILE, -(-width // TILE) * TILE)
+    if not cleared:
+        return FrameBuffers(np.empty(shape, np.uint32), np.empty(shape, np.uint32), np.empty(shape, np.int32))
     return FrameBuffers(np.zeros(shape, np.uint32), np.full(shape, DEPTH_MAX, np.uint32), np.full(shape, -1, np.int32))
 
 
@@ -246,7 +248,8 @@ def fine_raster(
         tiles_x=-(-width // TILE),
         coalescing=int(simt.coalescing),
     )
-    buffers = new_buffers(width, height, samples) if buffers is None else buffers
+    if buffers is None:
+        buffers = new_buffers(width, height, samples, cleared=units is None)
     if colors is None:
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
     drawn = active_tiles if units is None else active_tiles[units]
