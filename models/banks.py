@@ -26,6 +26,7 @@ An access is an int64 array with the index of the first 4-byte word of each lane
 from typing import Any
 
 from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
 
 WORD_BYTES = 4
 HALF_WARP = 16  # lanes
@@ -33,7 +34,7 @@ MOST_WORDS = 64  # of one request: bits of a mask
 
 
 @kernel
-def bank_passes(words: Any, lanes: int, simt: Any, access_words: int = 1) -> int:
+def bank_passes(words: Any, lanes: int, simt: Simt, access_words: int = 1) -> int:
     """Count the passes of one shared load, or of a store of each word by one lane.
 
     Parameters
@@ -61,7 +62,7 @@ def bank_passes(words: Any, lanes: int, simt: Any, access_words: int = 1) -> int
 
 
 @kernel
-def atomic_passes(words: Any, lanes: int, simt: Any) -> int:
+def atomic_passes(words: Any, lanes: int, simt: Simt) -> int:
     """Count the passes of one shared atomic: as ``bank_passes``, but every lane of a bank takes a pass of its own."""
     mode = simt.bank_mode_bytes // WORD_BYTES
     passes = 0
@@ -103,7 +104,7 @@ def _steps(words: Any, first: int, end: int, offset: int, banks: int) -> int:
 
 
 @kernel
-def _most_rows(words: Any, first: int, end: int, access_words: int, simt: Any) -> int:
+def _most_rows(words: Any, first: int, end: int, access_words: int, simt: Simt) -> int:
     """Most distinct rows that the lanes first..end-1 want from one bank."""
     mode = simt.bank_mode_bytes // WORD_BYTES
     row_words = simt.banks * simt.bank_bytes // WORD_BYTES

@@ -53,7 +53,7 @@ def _function(function: Any, seen: set[int]) -> Iterator[str]:
             yield from _global(function.__globals__[name], names, seen)
 
 
-def _global(value: Any, names: list[str], seen: set[int]) -> Iterator[str]:
+def _global(value: object, names: list[str], seen: set[int]) -> Iterator[str]:
     """Describe what a global name means; of a module of ours, what those of the names mean that it has."""
     if isinstance(value, ModuleType):
         yield value.__name__

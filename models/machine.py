@@ -11,7 +11,7 @@ import hashlib
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import msgspec
 import msgspec.structs
@@ -193,7 +193,7 @@ def _plain(table: dict[str, Any], prefix: str, origins: dict[str, tuple[Provenan
             continue
         if not isinstance(entry, dict) or set(entry) != {"value", "provenance", "source"}:
             raise TilestampError(f"{file}: {name} must be written {{ value = ..., provenance = ..., source = ... }}")
-        if entry["provenance"] not in Provenance.__args__:  # type: ignore[attr-defined]
+        if entry["provenance"] not in get_args(Provenance):
             raise TilestampError(f"{file}: {name} has the unknown provenance {entry['provenance']!r}")
         values[key] = entry["value"]
         origins[name] = (entry["provenance"], str(entry["source"]))
@@ -212,7 +212,7 @@ def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]
     return msgspec.structs.replace(machine, digest=digest)
 
 
-def _check_keys(table: Any, known: list[str], optional: set[str], what: str, file: str) -> None:
+def _check_keys(table: object, known: list[str], optional: set[str], what: str, file: str) -> None:
     if not isinstance(table, dict):
         raise TilestampError(f"{file}: a {what} must be a table")
     for key in table:

@@ -18,7 +18,7 @@ def plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[
     }
 
 
-def plain_number(value: Any) -> Any:
+def plain_number(value: object) -> Any:
     """Make a number of NumPy one of Python; leave the rest."""
     return value.item() if isinstance(value, np.generic) else value
 

@@ -1,7 +1,7 @@
 """Cost against error on logarithmic axes: a colour a group, the front as steps, published points hollow."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 MARKERS = "os^vP*Xd"
 MOST_NAMES = 18
@@ -76,7 +77,7 @@ def frontier(
         axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _ticks(axes: Any) -> None:
+def _ticks(axes: "Axes") -> None:
     """Plain numbers at the decades, and at 2 and 5 where there are few decades."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
@@ -88,14 +89,14 @@ def _ticks(axes: Any) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _steps(axes: Any, front: "pd.DataFrame") -> None:
+def _steps(axes: "Axes", front: "pd.DataFrame") -> None:
     """Draw the front from the cheapest to the most exact point."""
     rows = front.sort_values(["cost", "height"])
     label = "front: nothing beats it in both"
     axes.step(rows["cost"], rows["height"], where="post", color="black", linewidth=1.0, label=label)
 
 
-def _label(axes: Any, shown: "pd.DataFrame") -> None:
+def _label(axes: "Axes", shown: "pd.DataFrame") -> None:
     """Write names beside their points, lower where the next one to the left is as high; too many are left out."""
     named = shown.drop_duplicates(["name", "cost", "height"]).sort_values("cost")
     if len(named) > MOST_NAMES and "front" in named:

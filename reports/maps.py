@@ -10,6 +10,7 @@ from tilestamp.reports.style import HEAT, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axis import Axis
 
 COLUMNS = 3  # panels side by side, at most
 
@@ -71,7 +72,7 @@ def _are_names(labels: "pd.Index") -> bool:
     return isinstance(labels[0], str)
 
 
-def _name(axis: Any, labels: "pd.Index", **style: Any) -> None:
+def _name(axis: "Axis", labels: "pd.Index", **style: Any) -> None:
     """Write names at their places."""
     if _are_names(labels):
         axis.set_ticks(range(len(labels)), list(labels), fontsize=8, **style)

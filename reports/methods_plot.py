@@ -11,6 +11,8 @@ from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
 COLUMNS = (5, 4, 3)  # whichever leaves the fewest places empty
 LINES: tuple[dict[str, Any], ...] = (
@@ -65,7 +67,14 @@ def panels(
 
 
 def _panel(
-    axes: Any, rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, fronts: tuple[str, str]
+    axes: "Axes",
+    rows: "pd.DataFrame",
+    name: str,
+    groups: list[str],
+    group: str,
+    x: str,
+    y: str,
+    fronts: tuple[str, str],
 ) -> None:
     linear = rows[y].max() < 10.0 * max(rows[y].min(), 1e-9)  # less than a decade: from zero
     positive = rows[y][rows[y] > 0]
@@ -103,13 +112,13 @@ def _style(index: int) -> dict[str, Any]:
     return {"marker": marker, "linestyle": "none", "markersize": 5, "color": color, "alpha": 0.85}
 
 
-def _mark(index: int) -> Any:
+def _mark(index: int) -> "Line2D":
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **_style(index))
 
 
-def _line(style: dict[str, Any]) -> Any:
+def _line(style: dict[str, Any]) -> "Line2D":
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **style)

@@ -79,7 +79,7 @@ def scene_digest(scene: Scene) -> str:
     return digest.hexdigest()[:DIGITS]
 
 
-def _arrays(value: Any) -> Iterator[NDArray[Any]]:
+def _arrays(value: object) -> Iterator[NDArray[Any]]:
     """All arrays in a value, in order; what is none counts as one."""
     if isinstance(value, tuple):
         for item in value:

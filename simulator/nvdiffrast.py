@@ -1,6 +1,6 @@
 """A reference for users of nvdiffrast: its CUDA rasterizer on NumPy arrays, without a GPU."""
 
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def _triangle_ids(
     return buffers.ids[0, :height, :width]
 
 
-def _check(pos: Any, tri: Any, resolution: Any) -> tuple[int, int]:
+def _check(pos: object, tri: object, resolution: Iterable[int]) -> tuple[int, int]:
     """Refuse what the original refuses; returns height and width."""
     if not isinstance(pos, np.ndarray) or pos.dtype != np.float32 or pos.ndim != 3 or pos.shape[2] != 4:
         raise TilestampError(f"pos must be a float32 array [B, V, 4], not {_describe(pos)}")
@@ -83,5 +83,5 @@ def _check(pos: Any, tri: Any, resolution: Any) -> tuple[int, int]:
     return height, width
 
 
-def _describe(value: Any) -> str:
+def _describe(value: object) -> str:
     return f"{value.dtype} {list(value.shape)}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -67,7 +67,7 @@ def plain(options: Options) -> dict[str, Any]:
     return values
 
 
-def checked(name: str, kind: Any, value: Any) -> Any:
+def checked(name: str, kind: object, value: object) -> Any:
     """Give ``value`` the type ``kind``; raises TilestampError with what the option ``name`` takes."""
     limit = ""
     for candidate in _readings(value):
@@ -82,7 +82,7 @@ def checked(name: str, kind: Any, value: Any) -> Any:
     raise TilestampError(f"{name} takes {takes(kind)}{limit}, not {shown}")
 
 
-def _readings(value: Any) -> list[Any]:
+def _readings(value: object) -> list[object]:
     """What a value may stand for: itself, or the plain number of a NumPy scalar, a whole float, a path."""
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         value = value.item()
@@ -95,14 +95,14 @@ def _readings(value: Any) -> list[Any]:
     return [value]
 
 
-def _array(kind: type, value: Any) -> Any:
+def _array(kind: type, value: object) -> Any:
     """Turn nested lists back into an array of bytes."""
     if get_origin(kind) is np.ndarray and isinstance(value, list):
         return np.array(value, np.uint8)
     return value
 
 
-def _representable(value: Any) -> bool:
+def _representable(value: object) -> bool:
     """Whether the numbers of a value are such that a kernel can take them."""
     if isinstance(value, tuple):
         return all(map(_representable, value))
@@ -111,7 +111,7 @@ def _representable(value: Any) -> bool:
     return not isinstance(value, int) or abs(value) < MOST
 
 
-def takes(kind: Any) -> str:
+def takes(kind: object) -> str:
     """Say what an option of a type takes: ``4, 8, 16 or 32``, ``a whole number from 1 to 16``."""
     *first, last = _said(types.type_info(kind)) if get_origin(kind) is not Literal else map(str, get_args(kind))
     return f"{', '.join(first)} or {last}" if first else last
@@ -148,7 +148,7 @@ def _number(noun: str, info: types.IntType | types.FloatType) -> str:
     return f"{noun} of {info.ge} or more" if info.ge is not None and not high else noun + low + high
 
 
-def choices(kind: Any) -> list[Any]:
+def choices(kind: object) -> list[Any]:
     """All values of a type that has a list of them or a range of whole numbers; none of others."""
     if get_origin(kind) is Literal:
         return list(get_args(kind))

@@ -19,6 +19,7 @@ from tilestamp.simulator.sampling.completed import completed
 from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.scenes.camera import clip_matrix
+from tilestamp.simulator.scenes.camera_files import CameraSource
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
 
@@ -30,7 +31,7 @@ def simulate(
     *,
     width: int = 1024,
     height: int = 768,
-    camera: Any = None,
+    camera: CameraSource = None,
     fidelity: Fidelity = "schedule",
     error: float = 0.0,
     seed: int = 0,

@@ -8,7 +8,7 @@ do not say: it was fitted by ``tilestamp.experiments.silicon.leave_one_out``, wh
 """
 
 import sys
-from collections import Counter
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -69,32 +69,32 @@ def code_of(listing: Path, kernel: str) -> dict[int, Block]:
     return {block[0].address: block for block in sass.basic_blocks(code)}
 
 
-def instructions(runs: tuple[Run, ...], code: dict[int, Block], passed: set[str]) -> tuple[Counter[str], float]:
+def instructions(runs: tuple[Run, ...], code: dict[int, Block], passed: set[str]) -> tuple[dict[str, float], float]:
     """Warp instructions by class of one event, and the lanes that run them on average."""
-    total: Counter[str] = Counter()
+    total: dict[str, float] = defaultdict(int)
     lanes = 0.0
     for run in runs:
         for address in run.addresses:
             for name, count in sass.classes(code[address]).items():
                 if name not in passed:
-                    total[name] += count * run.times  # type: ignore[assignment]  # fractions of a warp
+                    total[name] += count * run.times  # fractions of a warp
                     lanes += count * run.times * run.lanes
     return total, lanes / max(sum(total.values()), 1e-9)
 
 
 def chain(runs: tuple[Run, ...], code: dict[int, Block], factor: float) -> Price:
     """What the slowest warp waits for: arithmetic, and by themselves loads, atomics and barriers."""
-    price: Counter[str] = Counter()
+    price: dict[str, float] = defaultdict(int)
     for share in {min(run.times, 1.0) for run in runs if run.times > 0}:
         here = [a for run in runs if min(run.times, 1.0) == share for a in run.addresses]
         path = [i for address in sorted(here) for i in code[address]]
         barriers = sum(i.opcode == "BAR" for i in path)
         alone = sass.cycles(path, LATENCY)
-        price["chain_alu"] += share * (alone * factor + BARRIER_CYCLES * barriers) / ALU_CYCLES  # type: ignore[assignment]
-        price["chain_barrier"] += share * barriers  # type: ignore[assignment]
+        price["chain_alu"] += share * (alone * factor + BARRIER_CYCLES * barriers) / ALU_CYCLES
+        price["chain_barrier"] += share * barriers
         for name, opcode in (("chain_load", "LDG"), ("chain_atomic", "ATOMG")):
             waited = sass.cycles(path, LATENCY | {opcode: LONG}) - alone
-            price[name] += share * round(waited / LONG)  # type: ignore[assignment]
+            price[name] += share * round(waited / LONG)
     return {name: value for name, value in price.items() if value}
 
 
@@ -128,7 +128,7 @@ def event_prices(
         extra, active = fitted.get(event, (0.0, 32.0))
         if extra:
             lanes = (lanes * sum(total.values()) + active * extra) / (sum(total.values()) + extra)
-            total["int32"] += extra  # type: ignore[assignment]
+            total["int32"] += extra
         price: Price = {name: count for name, count in sorted(total.items()) if count}
         if event in chains:
             price |= chain(chains[event], code, factors.get(event, factors.get("", 1.0)))

@@ -66,8 +66,8 @@ def raster_prices(sections: Sections, tile: int, spp: int) -> dict[str, Price]:
     part = {name: chain(s[name], copies * alone) for name in ("BOX", "HIT", "Z")}
     grids = chain(s["QUAD"], QUADS) | {}
     grids["chain_alu"] = float(grids["chain_alu"]) + float(chain(s["GRID"])["chain_alu"])
-    quad: Counter[str] = Counter(counted(s["QUAD"]))  # type: ignore[arg-type]  # counts that may be fractions
-    quad += Counter(counted(s["GRID"], 1 / QUADS))  # type: ignore[arg-type]
+    quad: Counter[str] = Counter(counted(s["QUAD"]))  # counts that may be fractions
+    quad += Counter(counted(s["GRID"], 1 / QUADS))
     prices: dict[str, Price] = {
         "PIXEL_WARPS": counted(s["PIXEL"]) | chain(s["PIXEL"], alone) | {"chain_load": alone, "lanes": "PIXEL_LANES"},
         "LIST_WARPS": counted(s["LIST"]) | chain(s["LIST"], alone) | {"chain_load": alone} | threads,

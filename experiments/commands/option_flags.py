@@ -66,7 +66,7 @@ def option_table(kind: type[Options]) -> dict[str, dict[str, str]]:
     }
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """A value as it is written on the command line."""
     return str(value).lower() if value is None or isinstance(value, bool) else str(value)
 
@@ -105,7 +105,7 @@ def parted(text: str) -> tuple[str, str]:
     return name, value
 
 
-def read(kind: Any, name: str, text: str | bool) -> Any:
+def read(kind: object, name: str, text: str | bool) -> Any:
     """Value of an option from text: a word, or the text as it stands, where the option takes that; else a number."""
     if kind is None or isinstance(text, bool):
         return text
@@ -115,7 +115,7 @@ def read(kind: Any, name: str, text: str | bool) -> Any:
     return literal(text)
 
 
-def literal(text: str) -> Any:
+def literal(text: str) -> object:
     """Number, tuple, true, false or none that is written in a text; the text itself where it is none of them."""
     if text.lower() in WORDS:
         return WORDS[text.lower()]

@@ -5,6 +5,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tilestamp.experiments.commands.terminal import print_table
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
@@ -21,7 +24,7 @@ TIME = {  # after them
 }
 
 
-def write_png(image: Any, path: Path) -> None:
+def write_png(image: NDArray[np.uint8], path: Path) -> None:
     """Write a picture, all of it or nothing."""
     from PIL import Image
 
@@ -84,7 +87,7 @@ def _sampling(run: Run) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """NumPy scalars and containers as JSON knows them."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}

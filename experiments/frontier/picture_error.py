@@ -114,7 +114,7 @@ def flip(truth: NDArray[np.float64], image: NDArray[np.uint8]) -> float:
         In [0, 1]: values that are shown, as those of the image are.
     image : ndarray, (H, W, 3), uint8
     """
-    from flip_evaluator import evaluate  # type: ignore[import-untyped]
+    from flip_evaluator import evaluate
 
     test = np.ascontiguousarray(image, np.float32) / np.float32(255.0)
     mean: float = evaluate(np.ascontiguousarray(truth, np.float32), test, "LDR", applyMagma=False)[1]

@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,14 +75,11 @@ def cases() -> list[Case]:
         return short
     large = {"width": 1600, "height": 1200, "bound": 2}
     patches = [
-        Case(f"{name}, bound 2", lambda name=name: load_scene(name), "micropolygon", "gtx280", large)  # type: ignore[misc]
+        Case(f"{name}, bound 2", partial(load_scene, name), "micropolygon", "gtx280", large)
         for name in ("teapot", "bigguy", "killeroo")
     ]
-    scans = [
-        Case(name, lambda name=name: load_scene(name), "cudaraster", "gtx480")  # type: ignore[misc]
-        for name in ("dragon_100k", "buddha_100k")
-    ]
-    meshes = [Case(f"torus {n} M", lambda n=n: torus(n * 1_000_000), "cudaraster", "gtx480") for n in (1, 5)]  # type: ignore[misc]
+    scans = [Case(name, partial(load_scene, name), "cudaraster", "gtx480") for name in ("dragon_100k", "buddha_100k")]
+    meshes = [Case(f"torus {n} M", partial(torus, n * 1_000_000), "cudaraster", "gtx480") for n in (1, 5)]
     return [*short, *patches, *scans, *meshes]
 
 

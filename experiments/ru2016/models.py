@@ -1,6 +1,7 @@
 """Ru 2016, tiles against primitives: eight models, tiled with and without culling, and per primitive."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -168,9 +169,9 @@ def _figures(cells: list[Cell]) -> list[Figure]:
         ]
     )
 
-    def times(path: object) -> None:
+    def times(path: Path) -> None:
         paired_bars(
-            bars, path, label="cell", ours="ours", published="published", status="status",  # type: ignore[arg-type]
+            bars, path, label="cell", ours="ours", published="published", status="status",
             title="Eight models, three ways (GT 750M)", y_label="ms",
         )  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Ru 2016, performance against tile size: occupancy and time of the engine at tiles of 4, 8, 16, 32."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pandas as pd
 
@@ -115,9 +116,9 @@ def _figures(rows: list[Cell]) -> list[Figure]:
         return []
     bars = pd.DataFrame([{"tile": c.row, "ours": c.ours, "published": c.published, "status": c.status} for c in rows])
 
-    def times(path: object) -> None:
+    def times(path: Path) -> None:
         paired_bars(
-            bars, path, label="tile", ours="ours", published="published", status="status",  # type: ignore[arg-type]
+            bars, path, label="tile", ours="ours", published="published", status="status",
             title="The engine by tile size (GT 750M)", y_label="ms",
         )  # fmt: skip
 

@@ -6,6 +6,7 @@ Where the picture differs from what was meant is found by bisection; the cure is
 Zhang's PrimitiveBinning has no row: none of 1,000 frames on an H200 showed what it can do.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,9 @@ def columns_wrong(offset: float, samples: str = "corners") -> int:
     return int(np.count_nonzero((meant >= 0).any(axis=0) != (drawn >= 0).any(axis=0)))
 
 
-def boundary(fails: Any, low: float, high: float, scale: Scale) -> tuple[float | None, float | None]:
+def boundary(
+    fails: Callable[[float], object], low: float, high: float, scale: Scale
+) -> tuple[float | None, float | None]:
     """Value that holds, and value that breaks."""
     return bisect(lambda value: bool(fails(value)), low, high, scale=scale)
 

@@ -6,11 +6,12 @@ needs no clipping at all.
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, Scale, atlas_result, bisect, bracket
@@ -65,7 +66,7 @@ def run(progress: Callable[[str], None]) -> Result:
     return atlas_result("stability/clipping", title, boundaries, [figure], costs, {"wrong": table})
 
 
-def _parallelogram(origin: Any, across: Any, along: Any) -> Corners:
+def _parallelogram(origin: ArrayLike, across: ArrayLike, along: ArrayLike) -> Corners:
     o, a, b = (np.asarray(v, np.float64) for v in (origin, across, along))
     return np.stack([o, o + a, o + b, o + a + b])
 
@@ -216,7 +217,7 @@ def _clipping_costs() -> list[str]:
     return notes
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw a map a case: value by pipeline."""
     maps = {}
     for title, group in table.groupby("case", sort=False):

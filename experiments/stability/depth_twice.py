@@ -12,6 +12,7 @@ than the slack are drawn in the order of their triangles.
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -165,7 +166,7 @@ def _notes(table: pd.DataFrame, slack: int) -> list[str]:
     return [lost, needed]
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw the share of holes by tilt, a line a depth."""
     drawn = (table.holes > 0) & ((table.second == next(iter(WAYS))) | (table.middle == MIDDLE))
     lines(

@@ -7,6 +7,7 @@ bits, and a float32 matrix loses them again where the eye's place cancels agains
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -158,7 +159,7 @@ def _cost(distance: float = DISTANCES[-1]) -> str:
     )
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw what is wrong by distance."""
     lines(
         table.assign(wrong=100 * table.wrong),

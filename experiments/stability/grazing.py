@@ -6,6 +6,7 @@ Compared is the depth of every covered sample with the exact one, in steps of 16
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -159,7 +160,7 @@ def _worst(table: pd.DataFrame) -> str:
     )
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw the error by slope."""
     lines(
         table[table.error > 0].assign(error=table.error / WRONG),

@@ -16,6 +16,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.used import remembered
 from tilestamp.simulator.reference.coverage import exact_coverage
+from tilestamp.simulator.scenes.camera_files import CameraSource
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
@@ -96,7 +97,7 @@ def by_pipeline(pipeline: str, **options: Any) -> Method:
     return cover
 
 
-def draw(scene: Scene, pipeline: str, size: int, camera: Any = None, **options: Any) -> Run:
+def draw(scene: Scene, pipeline: str, size: int, camera: CameraSource = None, **options: Any) -> Run:
     """Draw a square picture on the atlas's machine."""
     return simulate(scene, pipeline, machine(), width=size, height=size, camera=camera, **options)
 

@@ -6,7 +6,7 @@ and less. Every sample inside must be hit once. A hole is a sample that no trian
 """
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -99,7 +99,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
     return [note]
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw double hits by distance; what lies on the samples is drawn one step to the left of the rest."""
     lines(
         table.assign(offset=table.offset.where(table.offset > 0.0, OFFSETS[-2] / 4)),

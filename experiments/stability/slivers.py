@@ -7,7 +7,7 @@ samples lost and samples gained, as a share of the samples that are exactly cove
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -146,7 +146,7 @@ def _cost_of_finer() -> str:
     )
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw a map a method: aspect by angle."""
     maps = {
         name: group.pivot_table(index="angle", columns="aspect", values="wrong")

@@ -5,7 +5,7 @@ pixel, whichever is drawn first.
 """
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -119,7 +119,7 @@ def _depth_bytes(run: Run) -> int:
     return sum(int(stream.bytes) for work in run.frame.works for stream in work.streams if stream.buffer == "depth")
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw the separation that breaks, by distance."""
     lines(
         table,

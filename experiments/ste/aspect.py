@@ -5,7 +5,7 @@ The mask is used in sequence, and with a warp of 32 polygons in flight that do n
 """
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -97,7 +97,7 @@ def _patch(long: float, short: float, angle: float) -> Micropolygons:
     return Micropolygons(vertices, np.zeros(len(flat), np.int32), np.zeros(len(flat), np.uint8))
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table.assign(line=table.area.map("{:g} pixels".format)),
         path,

@@ -22,7 +22,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygon
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
-from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, bit_mask
+from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, MaskKind, bit_mask
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 
@@ -88,7 +88,7 @@ def _measure(model: Model, level: int, height: int) -> dict[str, Any]:
     return row
 
 
-def _masked(polygons: Micropolygons, width: int, height: int, kind: Any) -> tuple[Samples, int, int]:
+def _masked(polygons: Micropolygons, width: int, height: int, kind: MaskKind) -> tuple[Samples, int, int]:
     samples = new_samples(width, height, sample_positions(1))
     work = bit_mask(polygons, samples, kind, 1, Simt()).works[0]
     return samples, work.total(BitMaskEvent.SAMPLE_TESTS), work.total(BitMaskEvent.SAMPLE_HITS)

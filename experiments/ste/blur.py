@@ -5,6 +5,7 @@ The published claim is the order alone: interleaving wins at high motion, and it
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -136,7 +137,7 @@ def _crossing(table: pd.DataFrame, radius: float, name: str) -> str:
     return f"{text}interleaving becomes the cheaper between {before:g} and {way:g} pixels of motion."
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table.assign(line=table.algorithm + table.radius.map(", circles of {:g} px".format)),
         path,
@@ -150,7 +151,7 @@ def _plot(table: pd.DataFrame, path: Any) -> None:
     )
 
 
-def _maps(path: Any) -> None:
+def _maps(path: Path) -> None:
     """Map the tests per pixel at 16 pixels of motion."""
     maps = {}
     for name, pattern in _patterns().items():

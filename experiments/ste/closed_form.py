@@ -6,6 +6,7 @@ A hits; at random rotation the mean of w and of h is perimeter / pi (derived: pu
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def run(progress: Callable[[str], None]) -> Result:
     )
 
 
-def _plot(table: pd.DataFrame, path: Any) -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,
@@ -106,7 +107,7 @@ def _cells(shape: str, area: float) -> list[dict[str, Any]]:
     rows = []
     for stamp in STAMPS:
         for touch in ("polygon", "box"):
-            laid = stamp_shape(stamp, touch)  # type: ignore[arg-type]
+            laid = stamp_shape(stamp, touch)
             counts = np.array([count_tests(b, PIXELS, PIXELS, sample_positions(1), laid) for b in batches], float)
             ratio = counts[:, 1].sum() / counts[:, 0].sum()
             spread = np.std(counts[:, 1] - ratio * counts[:, 0], ddof=1) / np.sqrt(BATCHES) / counts[:, 0].mean()

@@ -5,6 +5,7 @@ Patches are diced evenly here, to edges of a third of the paper's bounds of 8x8 
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -107,7 +108,7 @@ def _scene(name: str, bound: float) -> dict[str, Any]:
     }
 
 
-def _plot(sweep: pd.DataFrame, path: Any) -> None:
+def _plot(sweep: pd.DataFrame, path: Path) -> None:
     lines(
         sweep.assign(line="8x8 stamp, squares"),
         path,

@@ -6,6 +6,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 
@@ -78,7 +79,7 @@ def in_a_graph(work: Callable[[], None], copies: int) -> Callable[[], None]:
     return replay
 
 
-def spread(values: Any) -> float:
+def spread(values: NDArray[np.float64]) -> float:
     """Half of what lies between the first and the last decile, as a share of the median."""
     low, middle, high = np.percentile(values, [10, 50, 90])
     return float((high - low) / 2 / middle) if middle else 0.0

@@ -1,7 +1,6 @@
 """A machine file from measured numbers: what could not be measured comes from a machine near it, and says so."""
 
 from collections.abc import Iterable
-from typing import Any
 
 from tilestamp.experiments.validation.gpu import BUSY
 from tilestamp.experiments.validation.measuring import Number
@@ -38,7 +37,7 @@ def machine_file(numbers: Iterable[Number], base: Machine, name: str, descriptio
     return "\n".join(lines) + "\n"
 
 
-def _line(key: str, value: Any, number: Number | None, base: Machine, name: str) -> str:
+def _line(key: str, value: object, number: Number | None, base: Machine, name: str) -> str:
     """One number with its provenance."""
     if number is None:
         kind = "published" if base.provenance.get(name, ("assumed", ""))[0] == "published" else "assumed"
@@ -50,7 +49,7 @@ def _line(key: str, value: Any, number: Number | None, base: Machine, name: str)
     return f'{key} = {{ value = {_text(found)}, provenance = "measured", source = "{source}" }}'
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 

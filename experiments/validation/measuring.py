@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.validation.gpu import REPEATS, cupy, launch, microseconds, spread
 
@@ -25,7 +26,7 @@ class Number:
     how: str
 
 
-def number(key: str, samples: Any, how: str) -> Number:
+def number(key: str, samples: NDArray[np.float64], how: str) -> Number:
     """Median and spread of some samples."""
     return Number(key, float(np.median(samples)), spread(samples), how)
 
@@ -35,7 +36,7 @@ def attribute(name: str) -> int:
     return int(cupy().cuda.Device().attributes[name])
 
 
-def cycles_of(name: str, grid: int, block: int, arguments: Callable[[Any, Any], list[Any]]) -> Any:
+def cycles_of(name: str, grid: int, block: int, arguments: Callable[[Any, Any], list[Any]]) -> NDArray[np.float64]:
     """Cycles of the slowest block, over the repeats."""
     cp = cupy()
     cycles, out = cp.zeros(grid, cp.int64), cp.zeros(grid * block, cp.uint64)
@@ -110,7 +111,7 @@ def latencies() -> Iterator[Number]:
     yield number("issue.barrier", (many - four) / 28, "__syncthreads: cycles a further warp, of 32 against 4")
 
 
-def _walk(kernel: str, bytes_: int, stride: int, *, warm: bool = True) -> Any:
+def _walk(kernel: str, bytes_: int, stride: int, *, warm: bool = True) -> NDArray[np.float64]:
     """Cycles of a dependent load in a buffer that is walked in a random cycle, every line once before if ``warm``."""
     cp = cupy()
     count = bytes_ // stride

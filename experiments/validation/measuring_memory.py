@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.validation.gpu import cupy, in_a_graph, launch, microseconds, module, spread
 from tilestamp.experiments.validation.measuring import MIB, Number, attribute, cycles_of, number
@@ -21,7 +22,7 @@ def bandwidths(sms: int, mhz: float) -> Iterator[Number]:
     large = _power_of_two(min(2048 * MIB, int(cp.cuda.runtime.memGetInfo()[0]) // 4))
     buffer, out = cp.zeros(large // 4, cp.float32), cp.zeros(1, cp.float32)
 
-    def read(bytes_: int, laps: int) -> Any:
+    def read(bytes_: int, laps: int) -> NDArray[np.float64]:
         rounds = bytes_ * laps // (sms * 4 * 512 * 8 * 16)
         work = partial(launch, "read_all", sms * 4, 512, [buffer, np.uint64(bytes_ // 16 - 1), rounds, out])
         return sms * 4 * 512 * 8 * 16 * rounds / microseconds(work)  # MB/s
@@ -47,7 +48,7 @@ def _power_of_two(bytes_: int) -> int:
     return 1 << (bytes_.bit_length() - 1)
 
 
-def _bank_cycles(sms: int, stride: int) -> Any:
+def _bank_cycles(sms: int, stride: int) -> NDArray[np.float64]:
     """Cycles of a warp's shared load whose lanes are ``stride`` words apart."""
     return cycles_of("banks", sms, 1024, lambda c, o: [stride, 512, c, o]) / (512 * 8 * 32)
 
@@ -58,7 +59,7 @@ def atomics(sms: int, mhz: float) -> Iterator[Number]:
     counters, grid, block = cp.zeros(16 * MIB, cp.uint32), sms * 8, 256
     out, everything = cp.zeros(grid * block, cp.uint32), np.uint32(16 * MIB - 1)
 
-    def rate(kernel: str, *arguments: Any, rounds: int = ROUNDS, place: int = 0) -> Any:
+    def rate(kernel: str, *arguments: Any, rounds: int = ROUNDS, place: int = 0) -> NDArray[np.float64]:
         work = partial(launch, kernel, grid, block, [counters[place:], *arguments, rounds, out])
         return grid * block * rounds / microseconds(work)
 
@@ -121,7 +122,7 @@ def launches() -> Iterator[Number]:
     yield number("launch.blocks_per_us", blocks / times, "a million empty blocks")
 
 
-def _waited(work: Callable[[], None]) -> Any:
+def _waited(work: Callable[[], None]) -> NDArray[np.float64]:
     """Wall-clock microseconds of a launch and the wait for it."""
     from time import perf_counter
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.validation.gpu import BUSY, in_a_graph, microseconds, spread
 from tilestamp.experiments.validation.gpu_cases import SCENE, WIDTH, GpuCase, gpu_cases
@@ -59,7 +60,7 @@ def compare_here(machine: Machine, say: Callable[[str], None]) -> tuple["pd.Data
     return pd.DataFrame(rows), remarks
 
 
-def _times(case: GpuCase) -> Any:
+def _times(case: GpuCase) -> NDArray[np.float64]:
     """Time of one launch in a row of them, what resets it taken off, in microseconds."""
     reset = case.reset
     if reset is None:
@@ -69,7 +70,7 @@ def _times(case: GpuCase) -> Any:
         reset()
         case.start()
 
-    alone = np.median(microseconds(in_a_graph(reset, COPIES)))
+    alone = float(np.median(microseconds(in_a_graph(reset, COPIES))))
     return (microseconds(in_a_graph(both, COPIES)) - alone) / COPIES
 
 

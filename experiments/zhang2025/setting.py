@@ -7,6 +7,7 @@ face, so no vertex is shared. Nsight Compute locks the GPU to its base clock unl
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -83,6 +84,6 @@ def profiled(name: str) -> Machine:
     return altered(machine, numbers, "assumed", "base clock, which Nsight Compute locks to, from memory")
 
 
-def draw(scene: Scene, machine: str, **options: object) -> Run:
+def draw(scene: Scene, machine: str, **options: Any) -> Run:
     """Draw the scene as he did."""
-    return simulate(scene, "binned", machine, width=WIDTH, height=HEIGHT, fidelity="schedule", **options)  # type: ignore[arg-type]
+    return simulate(scene, "binned", machine, width=WIDTH, height=HEIGHT, fidelity="schedule", **options)

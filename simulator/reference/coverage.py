@@ -6,7 +6,7 @@ others (`orientation`). A sample on an edge belongs to the triangle whose left o
 the screen; what lies outside -1 to 1 is cut off sample by sample. Of equal depths the first triangle stays.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class Visible(NamedTuple):
 
 
 @kernel
-def set_up(corners, edges, owns, expansion):
+def set_up(corners: Any, edges: Any, owns: Any, expansion: Any) -> Any:
     """Edge functions opposite to corners 0, 1, 2, positive inside; returns the orientation, 0 where it has no area.
 
     Parameters
@@ -66,7 +66,9 @@ def set_up(corners, edges, owns, expansion):
 
 
 @kernel
-def _owns_closely(corners, owns, sign, x, y, a, b, c, near, expansion):
+def _owns_closely(
+    corners: Any, owns: Any, sign: int, x: Any, y: Any, a: Any, b: Any, c: Any, near: Any, expansion: Any
+) -> bool:
     """Whether a sample is covered that is inside, or on one of the three edges as far as ``near`` can tell."""
     for k in range(3):
         value = a if k == 0 else b if k == 1 else c
@@ -78,7 +80,7 @@ def _owns_closely(corners, owns, sign, x, y, a, b, c, near, expansion):
 
 
 @kernel
-def _span(triangle, axis, first, step, count):
+def _span(triangle: Any, axis: int, first: Any, step: Any, count: int) -> tuple[int, int]:
     """First and last grid line that a triangle can touch, or one more; all where it crosses the eye's plane."""
     low, high = np.inf, -np.inf
     for k in range(3):
@@ -92,7 +94,7 @@ def _span(triangle, axis, first, step, count):
 
 
 @kernel
-def _weights(triangle, depths, t, sign, weights):
+def _weights(triangle: Any, depths: Any, t: int, sign: int, weights: Any) -> None:
     """Factors of the edge functions in z / w: at a sample w is 1, so weights that add up to the determinant do it."""
     det = 0.0
     for k in range(3):
@@ -103,7 +105,9 @@ def _weights(triangle, depths, t, sign, weights):
 
 
 @kernel
-def _draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
+def _draw(
+    corners: Any, depths: Any, cull: Any, grid: Grid, first_row: int, end_row: int, ids: Any, depth: Any, hits: Any
+) -> None:
     """Draw all triangles, in order, to rows ``first_row`` up to ``end_row`` of a grid; the arrays hold only those.
 
     Scratch is private, and no view of a shared array is made for a sample: counting its references would make threads
@@ -150,7 +154,18 @@ def _draw(corners, depths, cull, grid, first_row, end_row, ids, depth, hits):
 
 
 @kernel
-def _draw_part(part, parts, corners, depths, cull, grid, first_row, ids, depth, hits):
+def _draw_part(
+    part: int,
+    parts: int,
+    corners: Any,
+    depths: Any,
+    cull: Any,
+    grid: Grid,
+    first_row: int,
+    ids: Any,
+    depth: Any,
+    hits: Any,
+) -> None:
     first, end = ids.shape[0] * part // parts, ids.shape[0] * (part + 1) // parts
     seen = (ids[first:end], depth[first:end], hits[first:end])
     _draw(corners, depths, cull, grid, first_row + first, first_row + end, *seen)

@@ -7,6 +7,8 @@ that of the largest. No rounding happens anywhere, unless a product leaves the r
 float32 (times a width below 2**20) cannot make one that does.
 """
 
+from typing import Any
+
 from tilestamp.models.kernel import kernel
 
 COMPONENTS = 32  # six products of four doubles each, and room
@@ -17,7 +19,7 @@ _BOUND = (
 
 
 @kernel
-def two_sum(a, b):
+def two_sum(a: Any, b: Any) -> tuple[Any, Any]:
     """Sum of two doubles, and what rounding took from it (Knuth)."""
     total = a + b
     part = total - a
@@ -25,7 +27,7 @@ def two_sum(a, b):
 
 
 @kernel
-def two_product(a, b):
+def two_product(a: Any, b: Any) -> tuple[Any, Any]:
     """Product of two doubles, and what rounding took from it (Dekker)."""
     product = a * b
     big = _SPLITTER * a
@@ -38,7 +40,7 @@ def two_product(a, b):
 
 
 @kernel
-def _grow(expansion, n, b):
+def _grow(expansion: Any, n: int, b: Any) -> int:
     """Add a double to an expansion of ``n`` components; returns how many there are then."""
     kept = 0
     for i in range(n):
@@ -53,7 +55,7 @@ def _grow(expansion, n, b):
 
 
 @kernel
-def _add_product(expansion, n, a, b, c):
+def _add_product(expansion: Any, n: int, a: Any, b: Any, c: Any) -> int:
     """Add a b c to an expansion."""
     high, low = two_product(a, b)
     for part in (low, high):
@@ -64,7 +66,7 @@ def _add_product(expansion, n, a, b, c):
 
 
 @kernel
-def edge_sign(p, q, x, y, w, expansion):
+def edge_sign(p: Any, q: Any, x: Any, y: Any, w: Any, expansion: Any) -> int:
     """Exact sign, -1, 0 or 1, of det(p, q, (x, y, w)).
 
     Parameters
@@ -85,7 +87,7 @@ def edge_sign(p, q, x, y, w, expansion):
 
 
 @kernel
-def edge_function(p, q, edge):
+def edge_function(p: Any, q: Any, edge: Any) -> None:
     """Coefficients of x, y and w of det(p, q, (x, y, w)) in double precision, and of its error bound, to ``edge`` (6,).
 
     The rounded value is within edge[3] |x| + edge[4] |y| + edge[5] |w| of the exact one.
@@ -97,7 +99,7 @@ def edge_function(p, q, edge):
 
 
 @kernel
-def sure_sign(edge, p, q, x, y, w, expansion):
+def sure_sign(edge: Any, p: Any, q: Any, x: Any, y: Any, w: Any, expansion: Any) -> Any:
     """Exact sign of det(p, q, (x, y, w)): by the rounded ``edge`` where its bound allows, by expansions elsewhere."""
     value = edge[0] * x + edge[1] * y + edge[2] * w
     bound = edge[3] * abs(x) + edge[4] * abs(y) + edge[5] * abs(w)

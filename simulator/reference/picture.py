@@ -5,14 +5,14 @@ values that are shown. A texture is the bilinear function of its texels (level 0
 mip level, and no choice of a filter, is taken for the truth.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.reference.coverage import CENTRE, cover, pixel_grid
+from tilestamp.simulator.reference.coverage import CENTRE, Grid, cover, pixel_grid
 from tilestamp.simulator.scenes.texture import add_bilinear, texture_chains
 
 SIDE = 16  # samples along a pixel: where an edge runs along the rows, 1/32 of its contrast is left at most
@@ -37,7 +37,7 @@ class Surface(NamedTuple):
 
 
 @kernel
-def _shade(surface, chains, t, x, y, texel, sample):
+def _shade(surface: Surface, chains: Any, t: int, x: Any, y: Any, texel: Any, sample: Any) -> None:
     """Colour of triangle t at a sample."""
     planes = surface.planes
     total = planes[t, 5, 0] * x + planes[t, 5, 1] * y + planes[t, 5, 2]
@@ -54,7 +54,19 @@ def _shade(surface, chains, t, x, y, texel, sample):
 
 
 @kernel
-def _pixel(surface, chains, ids, grid, j, i, side, first, sample, texel, out):
+def _pixel(
+    surface: Surface,
+    chains: Any,
+    ids: Any,
+    grid: Grid,
+    j: int,
+    i: int,
+    side: int,
+    first: int,
+    sample: Any,
+    texel: Any,
+    out: Any,
+) -> None:
     """Mean of the samples of pixel (i, j) of a band whose first row of samples is ``first``."""
     red, green, blue = 0.0, 0.0, 0.0
     for b in range(j * side, (j + 1) * side):
@@ -75,7 +87,9 @@ def _pixel(surface, chains, ids, grid, j, i, side, first, sample, texel, out):
 
 
 @kernel
-def _shade_part(part, parts, surface, chains, ids, grid, first_row, side, image):
+def _shade_part(
+    part: int, parts: int, surface: Surface, chains: Any, ids: Any, grid: Grid, first_row: int, side: int, image: Any
+) -> None:
     """Shade and average a part of the rows of pixels, whose first row of samples is ``first_row`` of the grid."""
     sample, texel, mean = np.empty(5), np.empty(4, np.float32), np.empty(3)
     for j in range(image.shape[0] * part // parts, image.shape[0] * (part + 1) // parts):

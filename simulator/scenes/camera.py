@@ -175,7 +175,7 @@ def _aspect(width: int, height: int) -> float:
     return width / height
 
 
-def _numbers(values: Any, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+def _numbers(values: object, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
     """Finite float64 values of a shape, or a sentence."""
     try:
         array = np.array(values, dtype=np.float64)

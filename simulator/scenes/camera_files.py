@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.camera import Camera, LookAt, ModelToClip
@@ -13,11 +14,12 @@ from tilestamp.simulator.scenes.library import with_views
 from tilestamp.simulator.scenes.scene import Scene
 
 MATRIX_KEY = "model_to_clip"
+CameraSource = Camera | ArrayLike | Mapping[str, Any] | Path | None
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")
 FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...} or {"position", "forward", "up", ...}'
 
 
-def read_camera(source: Any = None, scene: Scene | Mapping[str, Camera] | None = None) -> Camera:
+def read_camera(source: CameraSource = None, scene: Scene | Mapping[str, Camera] | None = None) -> Camera:
     """Make a camera of anything that describes one.
 
     Parameters
@@ -78,7 +80,7 @@ def _load_json(path: Path) -> Any:
         raise TilestampError(f"{path}: the camera file is not text") from None
 
 
-def _member(document: Any, key: str) -> Any:
+def _member(document: object, key: str) -> Any:
     """Give the member of a dictionary or list that a part of ``FILE.json:KEY:INDEX`` names."""
     if isinstance(document, Mapping) and key in document:
         return document[key]
@@ -87,7 +89,7 @@ def _member(document: Any, key: str) -> Any:
     raise TilestampError(f"there is no {key!r} in it; {_what_there_is(document)}")
 
 
-def _what_there_is(document: Any) -> str:
+def _what_there_is(document: object) -> str:
     if isinstance(document, Mapping):
         return "it has " + ", ".join(map(str, document))
     if isinstance(document, list):

@@ -1,5 +1,7 @@
 """What a cage must be before it is subdivided: checked, cleaned of isolated vertices, wound one way, creased."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,7 +86,7 @@ def _face_pairs(cage: Cage) -> Indices:
 
 
 @kernel
-def _turned_faces(offsets, corner_edges, beside, forwards):
+def _turned_faces(offsets: Any, corner_edges: Any, beside: Any, forwards: Any) -> tuple[Any, bool]:
     """Flood each component from its first face: which faces to turn, and whether that contradicts itself."""
     faces = len(offsets) - 1
     face_of = np.empty(len(corner_edges), np.int64)

@@ -1,5 +1,7 @@
 """One Catmull-Clark step and the limit masks, as plain loops (Catmull & Clark 1978; DeRose et al. 1998 for creases)."""
 
+from typing import Any
+
 import numpy as np
 
 from tilestamp.models.kernel import kernel
@@ -8,7 +10,9 @@ CORNER = 3  # sharp edges at a vertex from which on it is a corner and stays
 
 
 @kernel
-def step(positions, offsets, corners, corner_edges, edges, sharpness, cage_face):
+def step(
+    positions: Any, offsets: Any, corners: Any, corner_edges: Any, edges: Any, sharpness: Any, cage_face: Any
+) -> tuple[Any, ...]:
     """Refine a surface once; takes and returns the fields of a ``Surface``."""
     vertices, faces = len(positions), len(offsets) - 1
     points = np.empty((vertices + len(edges) + faces, 3))
@@ -38,7 +42,7 @@ def step(positions, offsets, corners, corner_edges, edges, sharpness, cage_face)
 
 
 @kernel
-def _edge_points(positions, edges, sharpness, beside, points):
+def _edge_points(positions: Any, edges: Any, sharpness: Any, beside: Any, points: Any) -> None:
     """Smooth: mean of both ends and both face points; sharp: the middle; between 0 and 1: between the two."""
     for e in range(len(edges)):
         a, b = edges[e]
@@ -53,7 +57,7 @@ def _edge_points(positions, edges, sharpness, beside, points):
 
 
 @kernel
-def _sharp_ends(positions, edges, sharpness):
+def _sharp_ends(positions: Any, edges: Any, sharpness: Any) -> tuple[Any, Any, Any]:
     """Of each vertex: sharp edges, boundary edges, sum of their sharpness (each at most 1), sum of their far ends."""
     sharp = np.zeros((len(positions), 2), np.int32)
     softness = np.zeros(len(positions))
@@ -71,7 +75,7 @@ def _sharp_ends(positions, edges, sharpness):
 
 
 @kernel
-def _vertex_points(positions, edges, sharpness, around, count, points):
+def _vertex_points(positions: Any, edges: Any, sharpness: Any, around: Any, count: Any, points: Any) -> None:
     """Smooth: (F + 2 R + (n - 3) P) / n; on a crease (1, 6, 1) / 8; at a corner P."""
     vertices = len(positions)
     spokes = np.zeros((vertices, 3))  # sum of the far ends of all edges
@@ -100,7 +104,9 @@ def _vertex_points(positions, edges, sharpness, around, count, points):
 
 
 @kernel
-def _new_faces(vertices, first_face, offsets, corners, corner_edges, edges, cage_face):
+def _new_faces(
+    vertices: int, first_face: int, offsets: Any, corners: Any, corner_edges: Any, edges: Any, cage_face: Any
+) -> tuple[Any, Any, Any]:
     """Make a quad of each corner: the corner, the next edge's point, the face point, the edge point before."""
     quads = np.empty(4 * len(corners), np.int32)
     quad_edges = np.empty(4 * len(corners), np.int32)
@@ -124,7 +130,9 @@ def _new_faces(vertices, first_face, offsets, corners, corner_edges, edges, cage
 
 
 @kernel
-def _new_edges(vertices, first_face, offsets, corner_edges, edges, sharpness):
+def _new_edges(
+    vertices: int, first_face: int, offsets: Any, corner_edges: Any, edges: Any, sharpness: Any
+) -> tuple[Any, Any]:
     """Two halves of each edge, a step less sharp, and a smooth spoke for each face corner."""
     halves = 2 * len(edges)
     new_edges = np.empty((halves + len(corner_edges), 2), np.int32)
@@ -142,7 +150,7 @@ def _new_edges(vertices, first_face, offsets, corner_edges, edges, sharpness):
 
 
 @kernel
-def limit_points(positions, quads, edges, sharpness):
+def limit_points(positions: Any, quads: Any, edges: Any, sharpness: Any) -> Any:
     """Limit of each vertex: (n^2 P + 4 E + F) / (n (n + 5)), on a crease (1, 4, 1) / 6, at a corner P."""
     vertices = len(positions)
     ring = np.zeros((vertices, 3))  # 4 x far ends of the edges + opposite corners of the quads

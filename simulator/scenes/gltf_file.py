@@ -137,7 +137,7 @@ class GltfFile:
         self.notes.add_if(len(scenes) > 1, f"of {len(scenes)} scenes the file's default, {index}, is drawn")
         return list(scenes[index].get("nodes", []))
 
-    def _entry(self, table: str, index: Any) -> dict[str, Any]:
+    def _entry(self, table: str, index: object) -> dict[str, Any]:
         rows = self.tree.get(table, [])
         if not isinstance(index, int) or not 0 <= index < len(rows):
             raise TilestampError(f"{self.path.name}: broken glTF: there is no {table} {index}")

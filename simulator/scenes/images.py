@@ -1,7 +1,6 @@
 """Image files as RGBA of 8 bits a channel, converted by value: 16-bit and floating-point grey is not clipped."""
 
 import io
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,7 @@ def read_image(data: bytes, what: str) -> NDArray[np.uint8]:
         raise TilestampError(f"{what} is not an image that can be read{reason}") from None
 
 
-def _grey(values: NDArray[np.float64], clear: Any, white: float) -> NDArray[np.uint8]:
+def _grey(values: NDArray[np.float64], clear: object, white: float) -> NDArray[np.uint8]:
     """RGBA of grey values in [0, 1], transparent where they are the one value that the file names."""
     grey = np.rint(np.clip(np.nan_to_num(values), 0.0, 1.0) * 255.0).astype(np.uint8)
     alpha = np.where(np.rint(values * white) == clear, 0, 255) if isinstance(clear, int) else np.full(grey.shape, 255)

@@ -98,7 +98,7 @@ def _stored(level: NDArray[np.float32], tile: int) -> NDArray[np.float32]:
 
 
 @kernel
-def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
+def texel_index(chains: TextureChains, texture: int, level: int, x: int, y: int) -> Any:
     """Where texel (x, y) of a level lies, in texels; x and y wrap."""
     first = chains.levels[texture, level, 0]
     width = chains.levels[texture, level, 1]
@@ -112,7 +112,7 @@ def texel_index(chains: Any, texture: int, level: int, x: int, y: int) -> Any:
 
 
 @kernel
-def nearest(chains: Any, texture: int, u: Any, v: Any, out: Any) -> None:
+def nearest(chains: TextureChains, texture: int, u: Any, v: Any, out: Any) -> None:
     """Write the RGBA of the texel that (u, v) falls into, level 0, to ``out``."""
     x = int(np.floor(u * np.float32(chains.levels[texture, 0, 1])))
     y = int(np.floor(v * np.float32(chains.levels[texture, 0, 2])))
@@ -122,7 +122,7 @@ def nearest(chains: Any, texture: int, u: Any, v: Any, out: Any) -> None:
 
 
 @kernel
-def footprint(chains: Any, texture: int, level: int, u: Any, v: Any) -> tuple[int, int, Any, Any]:
+def footprint(chains: TextureChains, texture: int, level: int, u: Any, v: Any) -> tuple[int, int, Any, Any]:
     """Lower left texel of the 2x2 texels around (u, v), and the weights of the right and upper ones."""
     s = u * np.float32(chains.levels[texture, level, 1]) - _HALF
     t = v * np.float32(chains.levels[texture, level, 2]) - _HALF
@@ -132,7 +132,7 @@ def footprint(chains: Any, texture: int, level: int, u: Any, v: Any) -> tuple[in
 
 
 @kernel
-def add_bilinear(chains: Any, texture: int, level: int, u: Any, v: Any, weight: Any, out: Any) -> None:
+def add_bilinear(chains: TextureChains, texture: int, level: int, u: Any, v: Any, weight: Any, out: Any) -> None:
     """Add ``weight`` times the bilinear value at (u, v) of one level to ``out``."""
     x, y, fx, fy = footprint(chains, texture, level, u, v)
     for dy in range(2):
@@ -145,7 +145,7 @@ def add_bilinear(chains: Any, texture: int, level: int, u: Any, v: Any, weight: 
 
 
 @kernel
-def level_of_detail(chains: Any, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
+def level_of_detail(chains: TextureChains, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
     """Automatic level: log2 of the longer of the two texel-space derivatives, in [0, last level]."""
     width = np.float32(chains.levels[texture, 0, 1])
     height = np.float32(chains.levels[texture, 0, 2])
@@ -158,7 +158,7 @@ def level_of_detail(chains: Any, texture: int, dudx: Any, dvdx: Any, dudy: Any, 
 
 
 @kernel
-def add_trilinear(chains: Any, texture: int, lod: Any, u: Any, v: Any, out: Any) -> None:
+def add_trilinear(chains: TextureChains, texture: int, lod: Any, u: Any, v: Any, out: Any) -> None:
     """Add the trilinear value at (u, v): two levels around ``lod``, blended by its fraction."""
     low = int(lod)
     high = min(low + 1, chains.counts[texture] - 1)

@@ -3,6 +3,8 @@
 Specification: notes on Laine & Karras 2011, section 8. Draw n is rotl32(x[n-11] + x[n-7], 13).
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ MASK = np.uint64(0xFFFFFFFF)
 
 
 @kernel
-def _draw(state: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> None:
+def _draw(state: Any, numbers: Any) -> None:
     """Fill ``numbers`` with the next draws, in place."""
     place = state[WORDS]
     for i in range(numbers.size):

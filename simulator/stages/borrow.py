@@ -29,7 +29,7 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _borrow(_context: Any, arrays: Any) -> Any:
     def codegen(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return _without_owner(context, builder, arrays, args[0])

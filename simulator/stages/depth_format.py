@@ -1,6 +1,6 @@
 """Depth formats of graphics interfaces: what a depth in [0, 1] is kept as, and in how many bytes."""
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ DEPTHS = {
 
 
 @kernel
-def stored_depth(z, scale):
+def stored_depth(z: Any, scale: Any) -> Any:
     """NDC depth as it is kept, 0 nearest; larger is farther in every format."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)
     if not unit >= _F0:  # NaN saturates to 0

@@ -42,7 +42,21 @@ class HardwareFrame(NamedTuple):
 
 
 @kernel
-def _quad(pieces, p, t, edge, x, y, corner, rows, bits, scale, ids, depth, counts):
+def _quad(
+    pieces: Pieces,
+    p: int,
+    t: int,
+    edge: Any,
+    x: int,
+    y: int,
+    corner: Any,
+    rows: int,
+    bits: int,
+    scale: Any,
+    ids: Any,
+    depth: Any,
+    counts: Any,
+) -> None:
     """Test the four pixels of one quad, whose lower-left pixel is (x, y); draw those of the strip's rows."""
     tests = 0
     for j in range(2):
@@ -66,7 +80,9 @@ def _quad(pieces, p, t, edge, x, y, corner, rows, bits, scale, ids, depth, count
 
 
 @kernel
-def _draw_strip(part, parts, pieces, bits, scale, cull, ids, depth, counts):
+def _draw_strip(
+    part: int, parts: int, pieces: Pieces, bits: int, scale: Any, cull: Any, ids: Any, depth: Any, counts: Any
+) -> None:
     """Draw all triangles, in order, to the rows of a strip, which begins at an even one."""
     pairs = (ids.shape[0] + 1) // 2
     first_row, end_row = 2 * (pairs * part // parts), min(2 * (pairs * (part + 1) // parts), ids.shape[0])

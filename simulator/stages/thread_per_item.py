@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 from functools import cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -83,14 +83,15 @@ def thread_per_item(
     table[:, ThreadEvent.WARP_LANES] = lanes
     table[:, ThreadEvent.BLOCKS] = 1
     streams = []
-    for op, accesses in (("load", loads), ("store", stores)):
+    moves: tuple[tuple[Literal["load", "store"], tuple[Access, ...]], ...] = (("load", loads), ("store", stores))
+    for op, accesses in moves:
         for access in accesses:
             count, size = record_transactions(access, simt)
             table[:, ThreadEvent[f"{op.upper()}_TRANSACTIONS"]] += warps * count
             table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
             footprint = items * access.stride
             moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
-            streams.append(Stream(access.buffer, op, moved, footprint))  # type: ignore[arg-type]
+            streams.append(Stream(access.buffer, op, moved, footprint))
     table = np.concatenate([table, np.zeros((idle_blocks, len(ThreadEvent)), np.int64)])
     return Work(
         stage=stage,

@@ -39,7 +39,7 @@ def new_squares(lanes: Any) -> Any:
 
 
 @kernel
-def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
+def set_square(squares: Squares, lane: Any, queue: Any, n: Any) -> None:
     """Put sub-patch ``n`` of the queue in a lane."""
     squares.patch[lane] = queue.patch[n]
     squares.i[lane], squares.j[lane] = queue.i[n], queue.j[n]
@@ -47,7 +47,7 @@ def set_square(squares: Any, lane: Any, queue: Any, n: Any) -> Any:
 
 
 @kernel
-def gather(points: Any, patch: Any, net: Any) -> Any:
+def gather(points: Any, patch: Any, net: Any) -> None:
     """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
     for lane in range(LANES):
         p = patch[lane]
@@ -57,7 +57,7 @@ def gather(points: Any, patch: Any, net: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def restriction(first: Any, side: Any, rows: Any) -> Any:
+def restriction(first: Any, side: Any, rows: Any) -> None:
     """Tables of the intervals [a, b] = [first * side, (first + 1) * side] by blossoms.
 
     Fill ``rows`` (4, 4, LANES) so that ``q[k] = sum_x rows[x, k] p[x]`` are the control points over the interval.
@@ -79,7 +79,7 @@ def _bernstein(a: Any, A: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def basis(first: Any, side: Any, rows: Any, slopes: Any) -> Any:
+def basis(first: Any, side: Any, rows: Any, slopes: Any) -> None:
     """Bernstein polynomials at four evenly spaced parameters of the intervals [first * side, (first + 1) * side].
 
     Parameters
@@ -124,7 +124,7 @@ def _weigh_steps(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> 
 
 
 @kernel
-def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
+def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> None:
     """Contract the rows of coordinate d of a net: ``between[r, x]``."""
     for x in range(4):
         for n in range(between.shape[0] // POINTS):
@@ -137,7 +137,7 @@ def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> Any:
 
 
 @kernel
-def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
+def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> None:
     """Contract the columns: ``out[d, 4 r + c]``."""
     for r in range(4):
         for n in range(between.shape[0] // POINTS):
@@ -150,7 +150,7 @@ def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> Any:
 
 
 @kernel
-def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
+def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> None:
     """Tensor product: control points of sub-patches by ``restriction`` tables, points of grids by ``basis`` tables.
 
     Parameters
@@ -168,7 +168,7 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> Any:
 
 
 @kernel
-def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
+def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> None:
     """Contract the differences of neighbouring columns."""
     for r in range(4):
         for n in range(between.shape[0] // POINTS):
@@ -181,7 +181,7 @@ def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> Any:
 
 
 @kernel
-def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
+def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> None:
     """Contract the differences of neighbouring rows."""
     for x in range(4):
         for n in range(between.shape[0] // POINTS):
@@ -196,7 +196,7 @@ def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> Any:
 @kernel
 def evaluate(
     net: Any, by_u: Any, by_v: Any, slope_u: Any, slope_v: Any, between: Any, out: Any, along_u: Any, along_v: Any
-) -> Any:
+) -> None:
     """Points of grids, and thirds of the derivatives along u and v: a coordinate of ``net`` a row of each.
 
     Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
@@ -210,7 +210,7 @@ def evaluate(
 
 
 @kernel
-def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> Any:
+def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> None:
     """Point of lane ``n`` at (u, v), and thirds of its derivatives along u and v: ``values[d]``, as ``evaluate``."""
     U, V = ONE - u, ONE - v
     by_u, by_v = _bernstein(u, U), _bernstein(v, V)

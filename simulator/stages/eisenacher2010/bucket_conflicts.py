@@ -4,7 +4,7 @@ The numbers are those of ``models.atomics`` (and tested against it); short lists
 make them cheap, because neighbours in the patch queue want the same few tiles.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ def atomic_rule(simt: Simt, padding: int) -> AtomicRule:
 
 
 @kernel
-def scratch(lanes):
+def scratch(lanes: int) -> Any:
     """Make the lists for one warp."""
     return Wanted(
         np.empty(lanes, np.int64),
@@ -59,7 +59,7 @@ def scratch(lanes):
 
 
 @kernel
-def keep_leaders(tile, lanes, leaders):
+def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
     """Copy only the first lane of each tile: it adds for the others (warp aggregation)."""
     for lane in range(lanes):
         leaders[lane] = tile[lane]
@@ -70,7 +70,7 @@ def keep_leaders(tile, lanes, leaders):
 
 
 @kernel
-def _find(values, found, value, guess):
+def _find(values: Any, found: int, value: int, guess: int) -> int:
     """Index of ``value``, or ``found``; a good guess saves the search."""
     if guess < found and values[guess] == value:
         return guess
@@ -81,7 +81,7 @@ def _find(values, found, value, guess):
 
 
 @kernel
-def list_wanted(tile, start, stop, padding, wanted):
+def list_wanted(tile: Any, start: int, stop: int, padding: int, wanted: Wanted) -> tuple[int, int, int, int]:
     """List what the lanes start..stop-1 want.
 
     Returns
@@ -116,7 +116,7 @@ def list_wanted(tile, start, stop, padding, wanted):
 
 
 @kernel
-def send_requests(wanted, chunks, merge, table):
+def send_requests(wanted: Wanted, chunks: int, merge: int, table: Any) -> int:
     """Count the requests that leave the SM, every lane or what a merged chunk needs; add them to ``table`` by chunk."""
     total = 0
     for c in range(chunks):

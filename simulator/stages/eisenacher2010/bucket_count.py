@@ -10,7 +10,7 @@ all lanes of a warp that want the same tile.
 """
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import get_num_threads
@@ -24,6 +24,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import (
+    AtomicRule,
     atomic_rule,
     keep_leaders,
     list_wanted,
@@ -73,7 +74,7 @@ _E = BucketCountEvent
 
 
 @kernel
-def _place(slots, count, idx):
+def _place(slots: Any, count: Any, idx: Any) -> None:
     """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
     patches = idx.shape[0]
     warps, sides, lanes = slots.shape
@@ -88,7 +89,9 @@ def _place(slots, count, idx):
 
 
 @kernel
-def _count_atomic(tile, lanes, rule, aggregate, wanted, row, chunk_requests, leaders):
+def _count_atomic(
+    tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, wanted: Any, row: Any, chunk_requests: Any, leaders: Any
+) -> None:
     """Events of one slot in one warp."""
     active = active_lanes(tile, lanes)
     row[_E.SLOT_WARPS] += 1
@@ -118,7 +121,7 @@ def _count_atomic(tile, lanes, rule, aggregate, wanted, row, chunk_requests, lea
 
 
 @kernel
-def active_lanes(tile, lanes):
+def active_lanes(tile: Any, lanes: int) -> int:
     """Lanes whose slot holds a tile."""
     active = 0
     for lane in range(lanes):
@@ -127,7 +130,9 @@ def active_lanes(tile, lanes):
 
 
 @kernel
-def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
+def patch_traffic(
+    first: int, lanes: int, patches: int, slots: int, coalescing: Any, addresses: Any
+) -> tuple[int, int, int, int]:
     """Load of the boxes and store of IDX by one warp: transactions and bytes of each.
 
     Four words a patch at once for 2x2 slots, else an array a slot.
@@ -146,7 +151,18 @@ def patch_traffic(first, lanes, patches, slots, coalescing, addresses):
 
 
 @kernel
-def _find_tiles(part, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests):
+def _find_tiles(
+    part: int,
+    parts: int,
+    boxes: Any,
+    tiles: Tiles,
+    rule: AtomicRule,
+    coalescing: Any,
+    aggregate: bool,
+    slots: Any,
+    table: Any,
+    requests: Any,
+) -> None:
     """Tiles of all lanes and slots in the blocks of one part, and their events; a row of ``requests`` a part."""
     patches = boxes.shape[0]
     blocks = (patches + BLOCK - 1) // BLOCK

@@ -4,6 +4,7 @@ One thread a patch again: for each tile that the patch overlaps, ``LISTS[START[t
 """
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ _E = BucketWriteEvent
 
 
 @kernel
-def _write(boxes, tiles, start, idx, lists):
+def _write(boxes: Any, tiles: Tiles, start: Any, idx: Any, lists: Any) -> None:
     """Fill LISTS."""
     for p in range(boxes.shape[0]):
         x0, y0, x1, y1 = tile_range(boxes[p], tiles)
@@ -58,7 +59,9 @@ def _write(boxes, tiles, start, idx, lists):
 
 
 @kernel
-def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row):
+def _count_slot(
+    tile: Any, first: int, lanes: int, slot: int, start: Any, idx: Any, coalescing: Any, addresses: Any, row: Any
+) -> None:
     """Count loads of START and stores to LISTS of one slot in one warp, at their real addresses."""
     active = active_lanes(tile, lanes)
     row[_E.SLOT_WARPS] += 1
@@ -84,7 +87,9 @@ def _count_slot(tile, first, lanes, slot, start, idx, coalescing, addresses, row
 
 
 @kernel
-def _count_blocks(part, parts, boxes, tiles, warp, start, idx, coalescing, table):
+def _count_blocks(
+    part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, start: Any, idx: Any, coalescing: Any, table: Any
+) -> None:
     """Events of the blocks of one part."""
     patches, blocks = boxes.shape[0], table.shape[0]
     slots = np.empty((tiles.slots**2, warp), np.int64)

@@ -21,6 +21,7 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010 import shading
 from tilestamp.simulator.stages.eisenacher2010.bezier import (
     LANES,
+    Squares,
     basis,
     evaluate,
     evaluate_point,
@@ -36,6 +37,7 @@ from tilestamp.simulator.stages.eisenacher2010.shading import (
     MATT,
     NORMAL,
     NUDGE,
+    Grid,
     lighting,
     new_grid,
     packed_color,
@@ -55,7 +57,7 @@ class Grids(NamedTuple):
 
 
 @kernel
-def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
+def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int) -> None:
     """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
     middle = np.float32(0.5)
     values = np.zeros((4, 3), np.float32)  # a coordinate a row: point, derivatives along u and v
@@ -76,7 +78,7 @@ def _borrow_normals(grid: Any, net: Any, squares: Any, lanes: Any) -> Any:
 
 
 @kernel
-def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, boxes: Any) -> Any:
+def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, colors: Any, boxes: Any) -> None:
     """Write the vertices of each lane, and bound them."""
     screen = grid.screen
     for n in range(lanes):
@@ -93,7 +95,7 @@ def _store_grids(grid: Any, first: Any, lanes: Any, vertices: Any, colors: Any, 
 
 
 @kernel(error_model="numpy")
-def _project(s: Any) -> Any:
+def _project(s: Any) -> None:
     """Divide the screen rows of all vertices by w."""
     for k in range(shading.VERTICES):
         scale = np.float32(1) / s[2 * shading.VERTICES + k]
@@ -104,10 +106,10 @@ def _project(s: Any) -> Any:
 
 @kernel
 def _dice(
-    part: Any,
-    parts: Any,
+    part: int,
+    parts: int,
     side: Any,
-    width: Any,
+    width: int,
     subpatches: Any,
     nets: Any,
     screen: Any,
@@ -117,7 +119,7 @@ def _dice(
     vertices: Any,
     colors: Any,
     boxes: Any,
-) -> Any:
+) -> None:
     """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
     grid, squares = new_grid(side, width), new_squares(width)
     corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)

@@ -141,7 +141,7 @@ def tangent(values: Any, along: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> Any:
+def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> None:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
     for k in range(VERTICES):
@@ -170,7 +170,7 @@ def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew:
 
 
 @kernel(error_model="numpy")
-def _set_checker(s: Any, squares: Any) -> Any:
+def _set_checker(s: Any, squares: Any) -> None:
     """Reflectances of a solid checker."""
     for k in range(VERTICES):
         scale = squares / s[POINT + 3 * VERTICES + k]
@@ -183,7 +183,7 @@ def _set_checker(s: Any, squares: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def _set_texels(s: Any, texture: Any, squares: Any) -> Any:
+def _set_texels(s: Any, texture: Any, squares: Any) -> None:
     """Reflectances from the texels at (u, v) of the patch, v down the rows."""
     for at in range(VERTICES):
         n, k = at % LANES, at // LANES
@@ -196,7 +196,7 @@ def _set_texels(s: Any, texture: Any, squares: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def _set_colors(s: Any) -> Any:
+def _set_colors(s: Any) -> None:
     """Light the reflectances: levels from 0 to 255."""
     for channel in range(3):
         for k in range(VERTICES):
@@ -205,7 +205,7 @@ def _set_colors(s: Any) -> Any:
 
 
 @kernel
-def shade(grid: Any, light: Any, texture: Any, squares: Any) -> Any:
+def shade(grid: Grid, light: Lighting, texture: Any, squares: Any) -> None:
     """Set the colours of grids with normals: three rows of levels, to be cut to whole numbers."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
     _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])

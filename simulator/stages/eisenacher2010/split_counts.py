@@ -80,7 +80,9 @@ _T = TransformEvent
 
 
 @kernel
-def _count_oracle_warp(first: Any, lanes: Any, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any) -> Any:
+def _count_oracle_warp(
+    first: Any, lanes: int, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any
+) -> None:
     """Events of one warp of the oracle."""
     boxes = 0
     for lane in range(lanes):
@@ -112,8 +114,8 @@ def _count_oracle_warp(first: Any, lanes: Any, patch: Any, path: Any, coalescing
 
 @kernel
 def _count_subdivide_warp(
-    first: Any, lanes: Any, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
-) -> Any:
+    first: Any, lanes: int, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
+) -> None:
     """Events of one warp of the subdivision: one store of what is kept, then four of children."""
     kept = split = 0
     for lane in range(lanes):
@@ -146,8 +148,8 @@ def _count_subdivide_warp(
 
 @kernel
 def _count_blocks(
-    part: Any, parts: Any, patch: Any, path: Any, places: Any, warp: Any, coalescing: Any, table: Any
-) -> Any:
+    part: int, parts: int, patch: Any, path: Any, places: Any, warp: int, coalescing: Any, table: Any
+) -> None:
     """Events of the blocks of one part; of the subdivision where ``places`` are given."""
     addresses = np.empty(warp, np.int64)
     for block in range(part * table.shape[0] // parts, (part + 1) * table.shape[0] // parts):

@@ -4,7 +4,7 @@ At most two a side where the bound is no larger than a tile, three where it is n
 """
 
 import math
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
 
 
 @kernel
-def tile_range(box, tiles):
+def tile_range(box: Any, tiles: Any) -> tuple[Any, Any, Any, Any]:
     """First and last tile column and row that the box x0, y0, x1, y1 overlaps; last < first where it is off screen."""
     scale = np.float32(1) / np.float32(tiles.size)
     right, bottom = np.float32(tiles.columns), np.float32(tiles.rows)
@@ -63,7 +63,7 @@ def tile_range(box, tiles):
 
 
 @kernel
-def slot_tiles(boxes, first, lanes, tiles, slots):
+def slot_tiles(boxes: Any, first: int, lanes: int, tiles: Tiles, slots: Any) -> None:
     """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes)."""
     for lane in range(lanes):
         x0, y0, x1, y1 = tile_range(boxes[first + lane], tiles)

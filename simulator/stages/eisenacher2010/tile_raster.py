@@ -55,7 +55,7 @@ _E = TileRasterEvent
 
 
 @kernel
-def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
+def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
     left, top = origin
@@ -89,8 +89,22 @@ def _raster_grid(vertices, colors, grid, origin, shape, samples, row):
 
 @kernel
 def _raster_tiles(
-    part, parts, drawn, vertices, colors, count, start, lists, tiles, shape, traffic, image, depth, overdraw, table
-):
+    part: int,
+    parts: int,
+    drawn: Any,
+    vertices: Any,
+    colors: Any,
+    count: Any,
+    start: Any,
+    lists: Any,
+    tiles: Tiles,
+    shape: BlockShape,
+    traffic: Any,
+    image: Any,
+    depth: Any,
+    overdraw: Any,
+    table: Any,
+) -> None:
     """One part of the tiles ``drawn``; row i of the table is that of the i-th of them."""
     size = shape.tile * shape.side
     samples = Samples(

@@ -5,7 +5,7 @@ quads of a batch with all its warps.
 """
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +129,7 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
 
 
 @kernel
-def box_warps(span, shape):
+def box_warps(span: Any, shape: BlockShape) -> Any:
     """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
     mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
     first_row, last_row = span[2] & mask, span[3] & mask
@@ -139,7 +139,9 @@ def box_warps(span, shape):
 
 
 @kernel
-def count_block(block, lists, first, grids, shape, traffic, row):
+def count_block(
+    block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
+) -> None:
     """Add the events that depend on the length of the list only, and the memory traffic of loads."""
     threads = shape.tile * shape.tile
     batch = threads // VERTICES
@@ -181,7 +183,9 @@ def count_block(block, lists, first, grids, shape, traffic, row):
 
 
 @kernel
-def _count_loads(block, lists, first, grids, shape, traffic, row):
+def _count_loads(
+    block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
+) -> None:
     """COUNT by every warp, START if there are grids; then an index for 16 lanes, a grid and its edges by the same."""
     together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // VERTICES)  # grids an instruction
     requests = shape.warps * (max(1, shape.warp // VERTICES) if shape.coalescing == _HALF_WARP else 1)
@@ -211,7 +215,7 @@ def _count_loads(block, lists, first, grids, shape, traffic, row):
 
 
 @kernel
-def count_stores(x0, y0, width, height, shape, addresses, row):
+def count_stores(x0: int, y0: int, width: int, height: int, shape: BlockShape, addresses: Any, row: Any) -> None:
     """Colour of each pixel on the screen, and depth where there is one sample a pixel."""
     threads = shape.tile * shape.tile
     buffers = 2 if shape.side == 1 else 1

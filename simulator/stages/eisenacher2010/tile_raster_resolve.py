@@ -4,14 +4,18 @@ Threads of a block draw the tile sub-tile by sub-tile, neighbouring threads at n
 2010, section 3.3); each leaves its colours in shared memory and then gathers the samples of its own pixel.
 """
 
+from typing import Any
+
 import numpy as np
 
 from tilestamp.models.banks import bank_passes
 from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import Samples
 
 
 @kernel
-def resolve(samples, side, x0, y0, image, depth, overdraw):
+def resolve(samples: Samples, side: int, x0: int, y0: int, image: Any, depth: Any, overdraw: Any) -> None:
     """Write the pixels of one tile that lie on the screen: mean colour, rounded; nearest depth; hits of all samples."""
     height, width = depth.shape
     count = np.uint32(side * side)
@@ -36,7 +40,7 @@ def resolve(samples, side, x0, y0, image, depth, overdraw):
 
 
 @kernel
-def resolve_replays(tile, side, simt):
+def resolve_replays(tile: int, side: int, simt: Simt) -> int:
     """Further passes of one block's shared stores and loads in the resolve, from the words that each lane touches."""
     replays = 0
     threads = tile * tile

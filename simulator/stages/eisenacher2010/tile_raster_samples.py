@@ -4,7 +4,7 @@ float32 throughout, each operation rounded by itself. The paper asks for four ed
 quad is interpolated is ours: as two triangles, split by the diagonal from the first vertex to the third.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,13 @@ class Samples(NamedTuple):
 
 
 @kernel
-def edge(ax, ay, bx, by, x, y):
+def edge(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any) -> Any:
     """Evaluate the edge function of a to b: twice the area of a, b and the sample."""
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
 @kernel
-def blend(a, b, c, u, v, w):
+def blend(a: Any, b: Any, c: Any, u: Any, v: Any, w: Any) -> Any:
     """Interpolate three packed colours; weights add up to one."""
     packed = BACKGROUND & np.uint32(0xFF000000)
     for shift in (0, 8, 16):
@@ -46,7 +46,7 @@ def blend(a, b, c, u, v, w):
 
 
 @kernel
-def quad_box(vertices, grid, v):
+def quad_box(vertices: Any, grid: int, v: int) -> tuple[Any, Any, Any, Any]:
     """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``."""
     ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, v + 1, 0], vertices[grid, v + 5, 0], vertices[grid, v + 4, 0]
     ay, by, cy, dy = vertices[grid, v, 1], vertices[grid, v + 1, 1], vertices[grid, v + 5, 1], vertices[grid, v + 4, 1]
@@ -56,7 +56,7 @@ def quad_box(vertices, grid, v):
 
 
 @kernel
-def sample_span(low, high, origin, side, samples):
+def sample_span(low: Any, high: Any, origin: Any, side: int, samples: int) -> tuple[int, int]:
     """First and last sample inside low..high on an axis of ``samples`` that starts at ``origin``, ``side`` a pixel.
 
     Exactly the samples at ``origin + (i + 0.5) / side`` that compare as inside: float64 holds every step.
@@ -67,7 +67,9 @@ def sample_span(low, high, origin, side, samples):
 
 
 @kernel
-def sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row):
+def sample_quad(
+    vertices: Any, colors: Any, grid: int, v: int, span: Any, origin: Any, shape: Any, samples: Samples, row: Any
+) -> tuple[int, int, int, int]:
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 
     Returns the warps and lanes that cover a sample, and those that pass the z-test; 0 where ``row`` is None.

@@ -10,7 +10,7 @@ repacked    lanes that are done take further polygons as soon as half of the lan
 """
 
 from enum import IntEnum
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -106,7 +106,7 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
 
 
 @kernel
-def _across_polygons(vertices, samples, sort, idle_to_refill, simt, table):
+def _across_polygons(vertices: Any, samples: Samples, sort: bool, idle_to_refill: int, simt: Simt, table: Any) -> None:
     lanes = (
         np.zeros((simt.warp, 6, 4), np.int64),  # edges
         np.zeros((simt.warp, 3, 4), np.int64),  # boxes
@@ -143,7 +143,7 @@ def _across_polygons(vertices, samples, sort, idle_to_refill, simt, table):
 
 
 @kernel
-def _box_sizes(vertices, first, last, samples, lanes, sizes):
+def _box_sizes(vertices: Any, first: int, last: int, samples: Samples, lanes: Any, sizes: Any) -> None:
     """Count the samples in the box of each polygon: the keys of the sort."""
     for p in range(first, last):
         set_up(vertices[p], lanes[0][0], lanes[1][0], lanes[2][0], lanes[3])
@@ -152,7 +152,7 @@ def _box_sizes(vertices, first, last, samples, lanes, sizes):
 
 
 @kernel
-def _refill(vertices, order, taken, samples, lanes, row):
+def _refill(vertices: Any, order: Any, taken: int, samples: Samples, lanes: Any, row: Any) -> int:
     """Give each idle lane the next polygon and set it up; returns how many have been taken."""
     edges, boxes, depths, snapped, walk, polygon = lanes
     row[AcrossPolygonsEvent.SETUP_WARPS] += 1
@@ -171,7 +171,7 @@ def _refill(vertices, order, taken, samples, lanes, row):
 
 
 @kernel
-def _step(samples, lanes, simt, row, addresses):
+def _step(samples: Samples, lanes: Any, simt: Simt, row: Any, addresses: Any) -> None:
     """Each lane that has a polygon tests the next sample of its box."""
     edges, _, depths, _, walk, polygon = lanes
     spp = len(samples.offsets)

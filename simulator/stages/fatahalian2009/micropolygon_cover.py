@@ -5,6 +5,8 @@ to test gives the same picture. A quad is its two triangles 0 1 2 and 0 2 3: it 
 mesh of quads has no gap and no doubly covered sample. One evaluation of a polygon at a sample is one test.
 """
 
+from typing import Any
+
 import numpy as np
 
 from tilestamp.models.kernel import kernel
@@ -17,7 +19,7 @@ BOXES = 3  # box of the polygon, then of each triangle
 
 
 @kernel
-def new_setup():
+def new_setup() -> tuple[Any, Any, Any, Any]:
     """Scratch of ``set_up``: edges (6, 4), boxes (3, 4), depths (2, 3), and the snapped vertices (4, 2)."""
     return (
         np.zeros((EDGE_ROWS, 4), np.int64),
@@ -28,7 +30,7 @@ def new_setup():
 
 
 @kernel
-def set_up(polygon, edges, boxes, depths, snapped):
+def set_up(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -> Any:
     """Set a polygon up: edge functions a x + b y + c >= 0 inside, boxes, depths; returns twice its signed area.
 
     Parameters
@@ -44,7 +46,7 @@ def set_up(polygon, edges, boxes, depths, snapped):
 
 
 @kernel
-def snap(polygon, boxes, snapped):
+def snap(polygon: Any, boxes: Any, snapped: Any) -> None:
     """Snap the vertices to the sub-pixel grid and fill the polygon's own box: all that choosing stamps needs."""
     for d in range(2):
         low = np.int64(np.floor(np.float64(polygon[0, d]) * STEP + 0.5))
@@ -60,7 +62,7 @@ def snap(polygon, boxes, snapped):
 
 
 @kernel
-def set_edges(polygon, edges, boxes, depths, snapped):
+def set_edges(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -> Any:
     """Set up edges and depths of snapped vertices; returns twice the signed area."""
     area = _triangle(snapped, 1, 2, 0, edges, boxes)
     depths[0, 0], depths[0, 1], depths[0, 2] = polygon[0, 2], polygon[1, 2], polygon[2, 2]
@@ -74,7 +76,7 @@ def set_edges(polygon, edges, boxes, depths, snapped):
 
 
 @kernel
-def _triangle(snapped, j, k, t, edges, boxes):
+def _triangle(snapped: Any, j: int, k: int, t: int, edges: Any, boxes: Any) -> Any:
     """Edges 0-j, j-k, k-0 of triangle t, turned so that the inside is positive; returns twice the signed area."""
     xi, yi, xj, yj, xk, yk = (
         snapped[0, 0], snapped[0, 1], snapped[j, 0], snapped[j, 1], snapped[k, 0], snapped[k, 1],
@@ -91,7 +93,7 @@ def _triangle(snapped, j, k, t, edges, boxes):
 
 
 @kernel
-def _edge(x0, y0, x1, y1, sign, edges, row):
+def _edge(x0: int, y0: int, x1: int, y1: int, sign: int, edges: Any, row: int) -> None:
     """One edge function; a triangle without area (sign 0) owns nothing and so covers nothing."""
     a = sign * (y0 - y1)
     b = sign * (x1 - x0)
@@ -102,7 +104,7 @@ def _edge(x0, y0, x1, y1, sign, edges, row):
 
 
 @kernel
-def covering_triangle(edges, x, y):
+def covering_triangle(edges: Any, x: int, y: int) -> int:
     """Triangle of the polygon (0 or 1) that covers the sample, -1 if none does: one sample test."""
     for first in range(0, EDGE_ROWS, 3):
         if (
@@ -115,7 +117,7 @@ def covering_triangle(edges, x, y):
 
 
 @kernel
-def depth_at(edges, depths, triangle, x, y):
+def depth_at(edges: Any, depths: Any, triangle: int, x: int, y: int) -> Any:
     """Depth of a triangle at a sample that it covers: barycentric, float64, rounded once to float32."""
     first = 3 * triangle
     at_2 = np.float64(_value(edges, first, x, y))  # the edge from 0 to 1 is opposite 2
@@ -126,13 +128,13 @@ def depth_at(edges, depths, triangle, x, y):
 
 
 @kernel
-def _value(edges, row, x, y):
+def _value(edges: Any, row: int, x: int, y: int) -> Any:
     """Evaluate an edge function without the top-left rule."""
     return edges[row, 0] * x + edges[row, 1] * y + edges[row, 2] + edges[row, 3]
 
 
 @kernel
-def touches(edges, boxes, corners, x0, y0, x1, y1):
+def touches(edges: Any, boxes: Any, corners: Any, x0: int, y0: int, x1: int, y1: int) -> bool:
     """Whether the polygon reaches into the square from (x0, y0) up to, not including, (x1, y1)."""
     for triangle in range(corners - 2):
         t = 1 + triangle
@@ -151,7 +153,7 @@ def touches(edges, boxes, corners, x0, y0, x1, y1):
 
 
 @kernel
-def fills(edges, corners, x0, y0, x1, y1):
+def fills(edges: Any, corners: Any, x0: int, y0: int, x1: int, y1: int) -> bool:
     """Whether one triangle of the polygon covers all of the square: every sample in it is hit, without a test."""
     for triangle in range(corners - 2):
         filled = True

@@ -4,7 +4,7 @@ A hit is one atomic minimum of depth and polygon in one 64-bit word; ties go to 
 picture does not depend on the order of arrival.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,7 @@ def new_samples(width: int, height: int, offsets: NDArray[np.int64]) -> Samples:
 
 
 @kernel
-def keep_nearest(samples, x, y, s, depth, polygon):
+def keep_nearest(samples: Samples, x: int, y: int, s: int, depth: Any, polygon: int) -> Any:
     """Atomic minimum of one hit; returns the byte address it went to."""
     at = (y * samples.width + x) * len(samples.offsets) + s
     if depth < samples.depth[at] or (depth == samples.depth[at] and polygon < samples.polygon[at]):
@@ -71,7 +71,7 @@ def keep_nearest(samples, x, y, s, depth, polygon):
 
 
 @kernel
-def count_hits(samples, addresses, hits, merge):
+def count_hits(samples: Samples, addresses: Any, hits: int, merge: int) -> Any:
     """Count one warp's atomic instruction: lanes, requests, conflicts, depth.
 
     ``addresses`` begins with those of the ``hits`` lanes that hit, in lane order.
@@ -82,7 +82,7 @@ def count_hits(samples, addresses, hits, merge):
 
 
 @kernel
-def on_screen(boxes, width, height):
+def on_screen(boxes: Any, width: int, height: int) -> tuple[int, int, int, int]:
     """Clip a polygon's box to the screen: x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if nothing is left."""
     return (
         max(boxes[0, 0], 0),
@@ -93,7 +93,7 @@ def on_screen(boxes, width, height):
 
 
 @kernel
-def pixel_box(boxes, width, height):
+def pixel_box(boxes: Any, width: int, height: int) -> tuple[int, int, int, int]:
     """First and last pixel (x0, y0, x1, y1) of a polygon's box, on screen; empty if x1 < x0 or y1 < y0."""
     x0, y0, x1, y1 = on_screen(boxes, width, height)
     return x0 >> STEP_BITS, y0 >> STEP_BITS, x1 >> STEP_BITS, y1 >> STEP_BITS

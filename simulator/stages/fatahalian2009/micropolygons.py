@@ -1,6 +1,6 @@
 """Micropolygons on screen: made from patches, cages and meshes (Fatahalian et al. 2009: about a pixel each)."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,7 +137,7 @@ def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:
 
 
 @kernel
-def _evaluate(points, rates, ends, polygons):
+def _evaluate(points: Any, rates: Any, ends: Any, polygons: Any) -> None:
     """Fill ``polygons`` (sum of rates^2, 4, 4) with the quads of each patch, row by row."""
     grid = np.empty((rates.max() + 1, rates.max() + 1, 4)) if len(rates) else np.empty((0, 0, 4))
     u = np.empty(4)
@@ -165,7 +165,7 @@ def _evaluate(points, rates, ends, polygons):
 
 
 @kernel
-def _bernstein(t, out):
+def _bernstein(t: Any, out: Any) -> None:
     s = 1.0 - t
     out[0] = s * s * s
     out[1] = 3.0 * s * s * t

@@ -6,7 +6,7 @@ point of the unit disc. The pattern of samples is a tile that repeats over the s
 """
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -152,7 +152,7 @@ def _reversed_bits(n: NDArray[np.int64], base: int) -> NDArray[np.float64]:
 
 
 @kernel
-def put(start, end, blur, p, time, u, v, polygon):
+def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, polygon: Any) -> None:
     """Write polygon p as it stands at a time and a lens point to ``polygon`` (3 or 4, 3)."""
     for k in range(start.shape[1]):
         for d in range(3):
@@ -162,7 +162,7 @@ def put(start, end, blur, p, time, u, v, polygon):
 
 
 @kernel
-def test_sample(p, setup, samples, x, y, s, at_x, at_y):
+def test_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> int:
     """One sample test of the polygon that is set up; returns 1 for a hit."""
     triangle = covering_triangle(setup[0], at_x, at_y)
     samples.tests[y, x] += 1
@@ -173,7 +173,7 @@ def test_sample(p, setup, samples, x, y, s, at_x, at_y):
 
 
 @kernel
-def set_up_at(start, end, blur, p, time_lens, polygon, setup):
+def set_up_at(start: Any, end: Any, blur: Any, p: int, time_lens: Any, polygon: Any, setup: Any) -> None:
     """Place a polygon and set it up."""
     put(start, end, blur, p, time_lens[0], time_lens[1], time_lens[2], polygon)
     set_up(polygon, setup[0], setup[1], setup[2], setup[3])

@@ -5,6 +5,8 @@ it is placed, set up once, and tested like a static one, at the one sample of ea
 point. How far it moves makes no difference; there are as many set-ups as distinct times and lens points.
 """
 
+from typing import Any
+
 import numpy as np
 
 from tilestamp.models.kernel import kernel
@@ -44,7 +46,7 @@ def motion_interleaved(polygons: MovingMicropolygons, pattern: BlurPattern, samp
 
 
 @kernel
-def _motion_interleaved(start, end, blur, pattern, samples, table):
+def _motion_interleaved(start: Any, end: Any, blur: Any, pattern: BlurPattern, samples: Samples, table: Any) -> None:
     setup = new_setup()
     polygon = np.empty(start.shape[1:], np.float32)
     tile, _, spp, _ = pattern.place.shape

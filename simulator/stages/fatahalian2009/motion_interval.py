@@ -5,6 +5,8 @@ is bounded, and sample s of the pixels in it is tested: the polygon is placed at
 Brute force is the same with the bounds of the whole shutter and the whole lens: the reference.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,7 +57,9 @@ def _draw(
 
 
 @kernel
-def _motion_interval(start, end, blur, pattern, samples, intervals, table):
+def _motion_interval(
+    start: Any, end: Any, blur: Any, pattern: BlurPattern, samples: Samples, intervals: Any, table: Any
+) -> None:
     setup = new_setup()
     polygon = np.empty(start.shape[1:], np.float32)
     tile = pattern.place.shape[0]
@@ -76,7 +80,7 @@ def _motion_interval(start, end, blur, pattern, samples, intervals, table):
 
 
 @kernel
-def _bound(start, end, blur, p, interval, samples):
+def _bound(start: Any, end: Any, blur: Any, p: int, interval: Any, samples: Samples) -> tuple[int, int, int, int]:
     """Pixels x0, y0, x1, y1 that the polygon may reach in an interval, on screen."""
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for k in range(start.shape[1]):

@@ -9,7 +9,7 @@ ones) 32 at a time, then test the samples of as many whole stamps as fit a warp,
 """
 
 from enum import IntEnum
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -128,7 +128,7 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
 
 
 @kernel
-def _stamps(vertices, samples, shape, simt, table):
+def _stamps(vertices: Any, samples: Samples, shape: StampShape, simt: Simt, table: Any) -> None:
     setup = new_setup()
     corners = vertices.shape[1]
     addresses = np.empty(simt.warp, np.int64)
@@ -152,7 +152,17 @@ def _stamps(vertices, samples, shape, simt, table):
 
 
 @kernel
-def _two_levels(p, corners, setup, samples, shape, simt, row, addresses, box):
+def _two_levels(
+    p: int,
+    corners: Any,
+    setup: Any,
+    samples: Samples,
+    shape: StampShape,
+    simt: Simt,
+    row: Any,
+    addresses: Any,
+    box: Any,
+) -> None:
     """Sort the coarse stamps of a box into culled, filled, and those to be cut into stamps."""
     edges, boxes, _, _ = setup
     side = shape.coarse * STEP
@@ -171,7 +181,17 @@ def _two_levels(p, corners, setup, samples, shape, simt, row, addresses, box):
 
 
 @kernel
-def _one_level(p, corners, setup, samples, shape, simt, row, addresses, box):
+def _one_level(
+    p: int,
+    corners: Any,
+    setup: Any,
+    samples: Samples,
+    shape: StampShape,
+    simt: Simt,
+    row: Any,
+    addresses: Any,
+    box: Any,
+) -> None:
     """Test the stamps of a box in row order, whole stamps to a warp where they fit."""
     edges, boxes, _, _ = setup
     wide, high = shape.width * STEP, shape.height * STEP
@@ -195,7 +215,19 @@ def _one_level(p, corners, setup, samples, shape, simt, row, addresses, box):
 
 
 @kernel
-def _test_stamp(p, setup, samples, shape, simt, row, addresses, i, j, used, hits):
+def _test_stamp(
+    p: int,
+    setup: Any,
+    samples: Samples,
+    shape: StampShape,
+    simt: Simt,
+    row: Any,
+    addresses: Any,
+    i: int,
+    j: int,
+    used: int,
+    hits: int,
+) -> tuple[int, int]:
     """Test every sample of one stamp, those off screen in vain; returns the lanes in use and their hits."""
     edges, _, depths, _ = setup
     for y in range(j * shape.height, (j + 1) * shape.height):
@@ -217,7 +249,7 @@ def _test_stamp(p, setup, samples, shape, simt, row, addresses, i, j, used, hits
 
 
 @kernel
-def _end_warp(samples, simt, row, addresses, used, hits):
+def _end_warp(samples: Samples, simt: Simt, row: Any, addresses: Any, used: int, hits: int) -> tuple[int, int]:
     """Count one warp execution of the test, and the atomics of its hits; returns no lanes in use, no hits."""
     if used > 0:
         row[StampsEvent.TEST_WARPS] += 1
@@ -228,7 +260,7 @@ def _end_warp(samples, simt, row, addresses, used, hits):
 
 
 @kernel
-def _count_hits(samples, addresses, hits, merge, row):
+def _count_hits(samples: Samples, addresses: Any, hits: int, merge: int, row: Any) -> None:
     lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, merge)
     row[StampsEvent.HIT_WARPS] += 1
     row[StampsEvent.ATOMIC_LANES] += lanes
@@ -238,7 +270,9 @@ def _count_hits(samples, addresses, hits, merge, row):
 
 
 @kernel
-def _fill(p, setup, samples, simt, row, addresses, left, top, size):
+def _fill(
+    p: int, setup: Any, samples: Samples, simt: Simt, row: Any, addresses: Any, left: int, top: int, size: int
+) -> None:
     """Write every sample of a coarse stamp that one triangle fills, a warp's worth at a time."""
     edges, _, depths, _ = setup
     used = 0
@@ -256,7 +290,7 @@ def _fill(p, setup, samples, simt, row, addresses, left, top, size):
 
 
 @kernel
-def _end_fill(samples, simt, row, addresses, used):
+def _end_fill(samples: Samples, simt: Simt, row: Any, addresses: Any, used: int) -> int:
     if used > 0:
         row[StampsEvent.FILLED_SAMPLES] += used
         row[StampsEvent.FILLED_WARPS] += 1

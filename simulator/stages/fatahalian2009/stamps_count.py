@@ -4,7 +4,7 @@ A polygon's tests are its stamps times a stamp's samples; its hits do not depend
 its own box are looked at. The counts are those that ``stamps`` counts by executing.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,9 @@ def count_tests(
 
 
 @kernel
-def _count(part, parts, vertices, width, height, offsets, shape, counts):
+def _count(
+    part: int, parts: int, vertices: Any, width: int, height: int, offsets: Any, shape: StampShape, counts: Any
+) -> None:
     """Count the polygons of one part; edges are set up only where a sample lies in the box, or stamps are chosen."""
     edges, boxes, depths, snapped = new_setup()
     stamps = 0
@@ -95,7 +97,7 @@ def _count(part, parts, vertices, width, height, offsets, shape, counts):
 
 
 @kernel
-def _touched(edges, boxes, corners, shape, i0, j0, i1, j1):
+def _touched(edges: Any, boxes: Any, corners: Any, shape: StampShape, i0: int, j0: int, i1: int, j1: int) -> int:
     """Stamps of a box that the polygon reaches; one that holds all of a polygon with an area certainly is."""
     wide, high = shape.width * STEP, shape.height * STEP
     if i0 == i1 and j0 == j1 and boxes[0, 0] >= i0 * wide and boxes[0, 1] >= j0 * high and edges[0, 0] != 0:

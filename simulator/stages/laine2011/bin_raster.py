@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, play
 from tilestamp.simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.work import Work
 
 STREAMS = 16  # blocks, and streams of a bin
@@ -49,14 +50,14 @@ class BinQueues(NamedTuple):
 
 
 @kernel
-def _play_part(part, parts, given, batch, counts, entries, events):
+def _play_part(part: int, parts: int, given: Any, batch: int, counts: Any, entries: Any, events: Any) -> None:
     """Play a share of the batches, each with its own rows: see ``play_batch``."""
     for b in range(counts.shape[0] * part // parts, counts.shape[0] * (part + 1) // parts):
         play_batch(given, b, batch, counts[b], entries, row_of(events, b))
 
 
 def bin_raster(
-    setup: Any,
+    setup: Setup,
     width: int,
     height: int,
     simt: Simt,
@@ -155,7 +156,7 @@ def _stream_totals(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     return totals
 
 
-def _work(events: NDArray[np.int64], setup: Any, pairs: int, segments: int, segment_bytes: int, bins: int) -> Work:
+def _work(events: NDArray[np.int64], setup: Setup, pairs: int, segments: int, segment_bytes: int, bins: int) -> Work:
     """Put the blocks' own rows in front, and name the buffers."""
     rest = np.zeros((STREAMS, len(BinRasterEvent)), np.int64)
     E = BinRasterEvent

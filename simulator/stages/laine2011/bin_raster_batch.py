@@ -5,7 +5,7 @@ every event, ``_fill_batch`` writes the entries where the counts have made room.
 the path of a warp (which decides whether its triangles are tested) depends on the company that they are in.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     BIN_SIDE_LOG2,
     SINGLE_TRIANGLE,
     WARP,
+    WarpBoxes,
     entry_slot,
     header_load,
     lane_box,
@@ -67,7 +68,7 @@ class BinScratch(NamedTuple):
 
 
 @kernel
-def _new_scratch(bins, counting):
+def _new_scratch(bins: int, counting: bool) -> Any:
     steps = bins if counting else 0
     stamp = np.zeros((steps, bins), np.int64)
     i64 = np.int64
@@ -75,7 +76,7 @@ def _new_scratch(bins, counting):
 
 
 @kernel
-def _read_step(given, ring, read, write, first, end, events):
+def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, end: int, events: Any) -> tuple[int, int]:
     """Read 512 counts and append their sub-triangles in order; returns the next triangle and the ring's end.
 
     The first triangle whose sub-triangles do not all fit, and all after it, are read again later.
@@ -110,7 +111,7 @@ def _read_step(given, ring, read, write, first, end, events):
 
 
 @kernel
-def _load_warp(given, ring, first, lanes, boxes):
+def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int]:
     """Boxes of a warp's triangles; returns the path that follows from them, and the bins of the largest box."""
     largest, path = 1, SINGLE
     last_x, last_y = given.bins_x - 1, given.bins_y - 1
@@ -131,7 +132,17 @@ def _load_warp(given, ring, first, lanes, boxes):
 
 
 @kernel
-def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, events):
+def _emit_warp(
+    given: BinInput,
+    path: int,
+    boxes: WarpBoxes,
+    lanes: int,
+    scratch: BinScratch,
+    first: int,
+    counts: Any,
+    entries: Any,
+    events: Any,
+) -> None:
     """Append a warp's triangles to the bins that they touch; count the segments of memory that this writes."""
     emits, stores = 0, 0
     for lane in range(lanes):
@@ -157,7 +168,7 @@ def _emit_warp(given, path, boxes, lanes, scratch, first, counts, entries, event
 
 
 @kernel
-def _distinct_bins(boxes, lanes):
+def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
     """Distinct bins of a warp whose boxes are one bin each."""
     distinct = 0
     for lane in range(lanes):
@@ -171,7 +182,9 @@ def _distinct_bins(boxes, lanes):
 
 
 @kernel
-def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
+def _count_warp(
+    given: BinInput, path: int, largest: int, boxes: WarpBoxes, lanes: int, scratch: BinScratch, first: int, events: Any
+) -> None:
     """Count what a warp's loads, its path and the walk to its queues cost."""
     area, indirect = 0, False
     for lane in range(lanes):
@@ -203,7 +216,7 @@ def _count_warp(given, path, largest, boxes, lanes, scratch, first, events):
 
 
 @kernel
-def play_batch(given, b, batch, counts, entries, events):
+def play_batch(given: BinInput, b: int, batch: int, counts: Any, entries: Any, events: Any) -> None:
     """Bin the input triangles of batch b, of ``batch`` triangles.
 
     ``counts`` holds the next place of each bin: from 0 when counting (``entries`` None), into ``entries`` when filling.
@@ -214,7 +227,7 @@ def play_batch(given, b, batch, counts, entries, events):
     while True:
         while write - read < BLOCK and first < end:
             first, write = _read_step(given, scratch.ring, read, write, first, end, events)
-        m = min(BLOCK, write - read)
+        m: Any = min(BLOCK, write - read)
         longest, steps, paths = 0, 0, 0
         for start in range(read, read + m, WARP):
             lanes = min(WARP, read + m - start)

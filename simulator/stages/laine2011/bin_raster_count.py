@@ -1,5 +1,7 @@
 """What bin raster counts: loads, atomics, segments and their writes, and what a round waits for."""
 
+from typing import Any
+
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import WARP
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
@@ -11,7 +13,7 @@ SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x
 
 
 @kernel
-def count_load(events, loads, segments, size):
+def count_load(events: Any, loads: int, segments: int, size: int) -> None:
     """Count loads, their transactions and bytes."""
     events[BinRasterEvent.LOAD] += loads
     events[BinRasterEvent.LOAD_TRANSACTIONS] += segments
@@ -19,7 +21,7 @@ def count_load(events, loads, segments, size):
 
 
 @kernel
-def count_atomic(events, executed):
+def count_atomic(events: Any, executed: int) -> None:
     """One thread's global atomic: a draw, or the allocation of a round's segments."""
     events[BinRasterEvent.ATOMIC] += executed
     events[BinRasterEvent.ATOMIC_LANES] += executed
@@ -28,7 +30,7 @@ def count_atomic(events, executed):
 
 
 @kernel
-def count_visible(subtriangles, events):
+def count_visible(subtriangles: Any, events: Any) -> None:
     """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
     most = 0
     for n in subtriangles:
@@ -38,7 +40,7 @@ def count_visible(subtriangles, events):
 
 
 @kernel
-def count_bins(bins, events):
+def count_bins(bins: int, events: Any) -> None:
     """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
     warps = (bins + WARP - 1) // WARP
     events[BinRasterEvent.BIN_WARPS] += warps
@@ -49,7 +51,7 @@ def count_bins(bins, events):
 
 
 @kernel
-def count_longest(walk, steps, paths, events):
+def count_longest(walk: int, steps: int, paths: int, events: Any) -> None:
     """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
     events[BinRasterEvent.LONGEST_WALKS] += walk
     events[BinRasterEvent.LONGEST_SLOW] += steps
@@ -59,7 +61,7 @@ def count_longest(walk, steps, paths, events):
 
 
 @kernel
-def count_segments(given, counts, scratch, events):
+def count_segments(given: Any, counts: Any, scratch: Any, events: Any) -> None:
     """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
 
     Its link is written where the last one ends; the new one's own link and count stand beside those of its neighbours.
@@ -86,7 +88,7 @@ def count_segments(given, counts, scratch, events):
 
 
 @kernel
-def count_closing(given, counts, scratch, events):
+def count_closing(given: Any, counts: Any, scratch: Any, events: Any) -> None:
     """Count the open segments at the end of a batch, and the writes of their counts."""
     for first in range(0, counts.size, WARP):
         closing, last = 0, -1
@@ -101,17 +103,17 @@ def count_closing(given, counts, scratch, events):
 
 
 @kernel
-def _count_store(events, segments, size):
+def _count_store(events: Any, segments: int, size: int) -> None:
     events[BinRasterEvent.STORE_TRANSACTIONS] += segments
     events[BinRasterEvent.STORE_BYTES] += segments * size
 
 
 @kernel
-def _sectors(first, words, size):
+def _sectors(first: int, words: int, size: int) -> int:
     """Memory segments of ``words`` words from word ``first`` on."""
     return ((first + words) * ENTRY_BYTES - 1) // size - first * ENTRY_BYTES // size + 1
 
 
 @kernel
-def _segments(entries):
+def _segments(entries: int) -> int:
     return (entries + BIN_SEGMENT - 1) // BIN_SEGMENT

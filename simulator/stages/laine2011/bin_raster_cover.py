@@ -5,7 +5,7 @@ triangle touch? A lane owns a triangle, walks the squares of its box row by row,
 every square that passes, by an OR in shared memory. The functions here work on one warp's triangles at a time.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ class WarpBoxes(NamedTuple):
 
 
 @kernel
-def new_boxes():
+def new_boxes() -> Any:
     """Make room for the triangles of one warp."""
     return WarpBoxes(
         np.zeros(WARP, np.int64),
@@ -45,7 +45,7 @@ def new_boxes():
 
 
 @kernel
-def entry_slot(entry, misc):
+def entry_slot(entry: Any, misc: Any) -> Any:
     """Slot of a queue entry: the triangle's own, or the sub-triangle's in the run that its header's word points to."""
     part = entry & 7
     if part == SINGLE_TRIANGLE:
@@ -54,7 +54,7 @@ def entry_slot(entry, misc):
 
 
 @kernel
-def lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
+def lane_box(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int, last_x: int, last_y: int) -> None:
     """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
     x0, y0, x1, y1, x2, y2 = (
         header[0] + dx,
@@ -73,7 +73,7 @@ def lane_box(boxes, lane, header, dx, dy, shift, last_x, last_y):
 
 
 @kernel
-def lane_edges(boxes, lane, header, dx, dy, shift):
+def lane_edges(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int) -> None:
     """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
     side = np.int64(1) << shift
     corner_x, corner_y = boxes.box[lane, 0] * side - dx, boxes.box[lane, 1] * side - dy
@@ -86,7 +86,7 @@ def lane_edges(boxes, lane, header, dx, dy, shift):
 
 
 @kernel
-def touches(boxes, lane, column, row):
+def touches(boxes: WarpBoxes, lane: int, column: int, row: int) -> bool:
     """Whether the triangle touches the closed square (column, row) of its box: no edge has it wholly outside."""
     for k in range(3):
         if boxes.edge[lane, k] - column * boxes.step[lane, 2 * k + 1] + row * boxes.step[lane, 2 * k] < 0:
@@ -95,7 +95,7 @@ def touches(boxes, lane, column, row):
 
 
 @kernel
-def _count_corner(boxes, lanes, stride, wide, high):
+def _count_corner(boxes: WarpBoxes, lanes: int, stride: int, wide: bool, high: bool) -> int:
     """Replays of the OR at one corner of all boxes (``wide``/``high``: of those two squares wide/high); -1: no lane."""
     boxes.bank[:] = 0
     deepest = 0
@@ -109,7 +109,7 @@ def _count_corner(boxes, lanes, stride, wide, high):
 
 
 @kernel
-def small_votes(boxes, lanes, stride):
+def small_votes(boxes: WarpBoxes, lanes: int, stride: int) -> tuple[int, int]:
     """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
     ors, replays = 0, 0
     for corner in range(4):
@@ -120,7 +120,7 @@ def small_votes(boxes, lanes, stride):
 
 
 @kernel
-def walk_votes(boxes, lanes, steps, stride):
+def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[int, int, int]:
     """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
     ors, replays, ends = 0, 0, 0
     for step in range(steps):
@@ -143,7 +143,7 @@ def walk_votes(boxes, lanes, steps, stride):
 
 
 @kernel
-def header_load(slot, lanes, segment_bytes):
+def header_load(slot: Any, lanes: int, segment_bytes: int) -> tuple[int, int]:
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
 
     The rule is that of ``models.coalescing``: distinct sectors of the warp, or distinct lines of each quarter-warp.

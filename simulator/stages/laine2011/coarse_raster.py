@@ -32,6 +32,7 @@ from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
     play_bin,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.work import Work
 
 TILE_PIXELS = 8
@@ -54,14 +55,14 @@ class TileQueues(NamedTuple):
 
 
 @kernel
-def _play_part(part, _parts, given, order, counts, entries, events):
+def _play_part(part: int, _parts: int, given: Any, order: Any, counts: Any, entries: Any, events: Any) -> None:
     """Play one bin, with its own rows: see ``play_bin``."""
     play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
 
 
 def coarse_raster(
     bin_queues: BinQueues,
-    setup: Any,
+    setup: Setup,
     width: int,
     height: int,
     simt: Simt,
@@ -147,7 +148,7 @@ def initial_capacity(triangles: int, width: int, height: int) -> int:
     return max(tiles, -(-triangles // TILE_SEGMENT)) + 4096
 
 
-def _input(queues: BinQueues, setup: Any, width: int, height: int, simt: Simt) -> CoarseInput:
+def _input(queues: BinQueues, setup: Setup, width: int, height: int, simt: Simt) -> CoarseInput:
     return CoarseInput(
         queues.starts,
         queues.entries,

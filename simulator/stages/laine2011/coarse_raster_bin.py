@@ -5,7 +5,7 @@ A bin is what a block draws from its queue. Its streams are merged segment by se
 bin raster a bin is played twice, to count and to fill.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
     WARP,
+    WarpBoxes,
     entry_slot,
     header_load,
     lane_box,
@@ -64,7 +65,7 @@ class Place(NamedTuple):
 
 
 @kernel
-def _place(given, b):
+def _place(given: CoarseInput, b: int) -> Any:
     bx, by = b % given.bins_x, b // given.bins_x
     return Place(
         bx * BIN_TILES,
@@ -77,7 +78,7 @@ def _place(given, b):
 
 
 @kernel
-def _load_warp(given, place, first, lanes, boxes):
+def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int, int]:
     """Boxes of a warp's triangles; returns its case, tiles of the largest and of the union box, and its rows."""
     small = True
     largest = 1
@@ -101,7 +102,7 @@ def _load_warp(given, place, first, lanes, boxes):
 
 
 @kernel
-def _emit_warp(case, boxes, lanes, counts, queues):
+def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, queues: Any) -> None:
     """Append a warp's triangles to the tiles that they touch."""
     for lane in range(lanes):
         box = boxes.box[lane]
@@ -115,7 +116,17 @@ def _emit_warp(case, boxes, lanes, counts, queues):
 
 
 @kernel
-def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
+def _count_warp(
+    given: CoarseInput,
+    case: int,
+    largest: int,
+    union: int,
+    rows: int,
+    boxes: WarpBoxes,
+    lanes: int,
+    first: int,
+    events: Any,
+) -> None:
     """Count what a warp's loads and its case cost."""
     area, indirect = 0, False
     for lane in range(lanes):
@@ -144,14 +155,14 @@ def _count_warp(given, case, largest, union, rows, boxes, lanes, first, events):
 
 
 @kernel
-def _count_load(events, loads, segments, size):
+def _count_load(events: Any, loads: int, segments: int, size: int) -> None:
     events[CoarseRasterEvent.LOAD] += loads
     events[CoarseRasterEvent.LOAD_TRANSACTIONS] += segments
     events[CoarseRasterEvent.LOAD_BYTES] += size
 
 
 @kernel
-def _count_atomic(events, executed):
+def _count_atomic(events: Any, executed: int) -> None:
     """One thread's global atomic."""
     events[CoarseRasterEvent.ATOMIC] += executed
     events[CoarseRasterEvent.ATOMIC_LANES] += executed
@@ -160,7 +171,7 @@ def _count_atomic(events, executed):
 
 
 @kernel
-def _count_emits(given, counts, before, tails, events):
+def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, events: Any) -> None:
     """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
     fresh, touched, emits, stores = 0, 0, 0, 0
     linked, opened, most = 0, 0, 0  # of the tiles of a warp
@@ -200,7 +211,7 @@ def _count_emits(given, counts, before, tails, events):
 
 
 @kernel
-def _count_tails(given, counts, tails, events):
+def _count_tails(given: CoarseInput, counts: Any, tails: Any, events: Any) -> None:
     """Count the writes that end the tiles' lists: the last segment's link, and its count where it is not full.
 
     ``tails`` numbers the last segment of each tile in the order of allocation.
@@ -219,7 +230,7 @@ def _count_tails(given, counts, tails, events):
 
 
 @kernel
-def _count_merge(given, b, events):
+def _count_merge(given: CoarseInput, b: int, events: Any) -> None:
     """Count the merges: a round takes whole segments until more than 512 entries wait, or none is left."""
     write, read, batch, taken = 0, 0, 0, 0
     total = given.starts[b + 1] - given.starts[b]
@@ -242,7 +253,7 @@ def _count_merge(given, b, events):
 
 
 @kernel
-def play_bin(given, b, counts, queues, events):
+def play_bin(given: CoarseInput, b: int, counts: Any, queues: Any, events: Any) -> None:
     """Find the tiles of a bin's entries.
 
     ``counts`` (256,) holds the next place of each tile: from 0 when counting (``queues`` None), into ``queues`` when

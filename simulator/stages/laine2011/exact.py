@@ -29,7 +29,7 @@ def fma(a: Any, b: Any, c: Any) -> Any:
     return np.float32(np.int64(bits).view(np.float64))
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _llvm_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
     def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.fma(*args)
@@ -49,7 +49,7 @@ def popcount(bits: Any) -> Any:
     return int(bits).bit_count()
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _llvm_popcount(_context: Any, bits: Any) -> Any:
     def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.ctpop(args[0])
@@ -67,7 +67,7 @@ def lowest_bit(bits: Any) -> Any:
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _llvm_lowest_bit(_context: Any, bits: Any) -> Any:
     def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.cttz(args[0], _true())
@@ -76,7 +76,7 @@ def _llvm_lowest_bit(_context: Any, bits: Any) -> Any:
 
 
 def _true() -> Any:  # the count for zero is left undefined
-    from llvmlite import ir  # type: ignore[import-untyped]
+    from llvmlite import ir
 
     return ir.Constant(ir.IntType(1), 1)
 

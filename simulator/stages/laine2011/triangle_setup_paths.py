@@ -79,7 +79,7 @@ def _outside(c: Any) -> Any:
 
 
 @kernel
-def _inside(clip: Any, first_axis: Any) -> Any:
+def _inside(clip: Any, first_axis: int) -> Any:
     """Whether no corner leaves the frustum along the axes from ``first_axis`` on; a NaN among numbers is ignored."""
     for k in range(3):
         seen = False

@@ -56,7 +56,7 @@ class FreePipeFrame(NamedTuple):
 
 
 @kernel
-def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
+def _draw_strip(part: int, parts: int, pieces: Pieces, colors: Any, frame: Any, halves: Any, tied: Any) -> None:
     """Draw all triangles to a share of the rows, in input order.
 
     ``frame`` holds the least of depth and payload; ``halves`` (None for packing "64") the two words of packing "32".
@@ -94,7 +94,7 @@ def _draw_strip(part, parts, pieces, colors, frame, halves, tied):
 
 
 @kernel
-def _keep_least(frame, tied, y, x, depth, payload):
+def _keep_least(frame: Any, tied: Any, y: int, x: int, depth: Any, payload: Any) -> None:
     value = (depth << np.uint64(32)) | payload
     old = frame[y, x, 0]
     if depth <= old >> np.uint64(32):
@@ -104,7 +104,7 @@ def _keep_least(frame, tied, y, x, depth, payload):
 
 
 @kernel
-def _keep_halves(frame, halves, tied, y, x, depth, t, colors):
+def _keep_halves(frame: Any, halves: Any, tied: Any, y: int, x: int, depth: Any, t: int, colors: Any) -> None:
     """Both words, and beside them the least of depth, colour and triangle: what one wide word would hold."""
     color = np.uint64(colors[t])
     old = frame[y, x, 0]

@@ -5,7 +5,7 @@ of whole vertices in clip space, so that coverage can be compared with cudaraste
 operations of the source; a compiler that contracts differently moves its last bits.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ class Pieces(NamedTuple):
 
 
 @kernel
-def _distance(p, plane, band):
+def _distance(p: Any, plane: int, band: Any) -> Any:
     """Signed distance to a clip plane, in the order +x -x +y -y +z -z; x and y as far out as the band's half sides."""
     axis = plane // 2
     w = p[3] if axis == 2 else p[3] * band[axis]
@@ -45,7 +45,7 @@ def _distance(p, plane, band):
 
 
 @kernel
-def _is_inside(p, band):
+def _is_inside(p: Any, band: Any) -> bool:
     if not p[3] >= _F0:
         return False
     for axis in range(3):
@@ -56,14 +56,14 @@ def _is_inside(p, band):
 
 
 @kernel
-def _copy(source, target):
+def _copy(source: Any, target: Any) -> None:
     """Copy a position; an assignment of slices would compile five seconds longer."""
     for c in range(4):
         target[c] = source[c]
 
 
 @kernel(error_model="numpy")
-def _clip(polygon, spare, band):
+def _clip(polygon: Any, spare: Any, band: Any) -> int:
     """Clip a triangle by all six planes in turn; returns the polygon's vertices."""
     n = 3
     for plane in range(PLANES):
@@ -90,7 +90,7 @@ def _clip(polygon, spare, band):
 
 
 @kernel
-def _classify(polygon, spare, band):
+def _classify(polygon: Any, spare: Any, band: Any) -> tuple[int, int]:
     """Clip in place; returns what the thread does and how many pieces it scans."""
     if _is_inside(polygon[0], band) and _is_inside(polygon[1], band) and _is_inside(polygon[2], band):
         return INSIDE, 1
@@ -105,14 +105,14 @@ def _classify(polygon, spare, band):
 
 
 @kernel
-def _pixels(a, b, c, bits, size):
+def _pixels(a: int, b: int, c: int, bits: int, size: int) -> tuple[int, int]:
     """First and last pixel whose centre lies between the least and the largest of three coordinates."""
     half = 1 << (bits - 1)
     return max((min(a, b, c) + half - 1) >> bits, 0), min((max(a, b, c) - half) >> bits, size - 1)
 
 
 @kernel(error_model="numpy")
-def _piece(vertices, width, height, bits, corner, box, depth):
+def _piece(vertices: Any, width: int, height: int, bits: int, corner: Any, box: Any, depth: Any) -> int:
     """Project and snap three clip positions, and find box and depth plane; returns which way it faces."""
     half = 1 << (bits - 1)
     z = depth  # the place of the result serves for the corners' depths first
@@ -145,7 +145,19 @@ def _piece(vertices, width, height, bits, corner, box, depth):
 
 
 @kernel
-def _thread(positions, triangles, t, width, height, bits, band, polygon, spare, fan, pieces):
+def _thread(
+    positions: Any,
+    triangles: Any,
+    t: int,
+    width: int,
+    height: int,
+    bits: int,
+    band: Any,
+    polygon: Any,
+    spare: Any,
+    fan: Any,
+    pieces: Any,
+) -> tuple[int, int]:
     """Clip triangle t and count its pieces; write them where ``pieces`` is given."""
     for k in range(3):
         _copy(positions[triangles[t, k]], polygon[k])
@@ -160,14 +172,16 @@ def _thread(positions, triangles, t, width, height, bits, band, polygon, spare, 
 
 
 @kernel
-def _classify_part(part, parts, positions, triangles, band, kind, count):
+def _classify_part(part: int, parts: int, positions: Any, triangles: Any, band: Any, kind: Any, count: Any) -> None:
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     for t in range(kind.size * part // parts, kind.size * (part + 1) // parts):
         kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, band, polygon, spare, polygon, None)
 
 
 @kernel
-def _project_part(part, parts, positions, triangles, width, height, bits, band, pieces):
+def _project_part(
+    part: int, parts: int, positions: Any, triangles: Any, width: int, height: int, bits: int, band: Any, pieces: Pieces
+) -> None:
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     fan = np.empty((3, 4), np.float32)
     for t in range(pieces.kind.size * part // parts, pieces.kind.size * (part + 1) // parts):
@@ -175,7 +189,7 @@ def _project_part(part, parts, positions, triangles, width, height, bits, band, 
 
 
 @kernel
-def start_edges(corner, bits, x, y, edge):
+def start_edges(corner: Any, bits: int, x: int, y: int, edge: Any) -> None:
     """Edge functions at the centre of pixel (x, y), less one where the edge does not own its points."""
     half = np.int64(1) << (bits - 1)
     center_x, center_y = (np.int64(x) << bits) + half, (np.int64(y) << bits) + half
@@ -188,7 +202,7 @@ def start_edges(corner, bits, x, y, edge):
 
 
 @kernel
-def fixed_depth(z):
+def fixed_depth(z: Any) -> Any:
     """NDC depth to 32 bits of fixed point, 0 nearest."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)
     if not unit >= _F0:  # NaN saturates to 0

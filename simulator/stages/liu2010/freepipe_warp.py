@@ -5,7 +5,7 @@ each row that any lane still has, as many steps as the widest box among those la
 clipping go first; then the others scan the triangles of their clipped polygons, one after another.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from tilestamp.models.atomics import CHUNK_BYTES, SECTOR
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     CLIPPED,
     INSIDE,
     SUBPIXEL_BITS,
+    Pieces,
     fixed_depth,
     start_edges,
 )
@@ -26,6 +28,16 @@ WARP = 32
 INDEX_BYTES = 4
 POSITION_BYTES = 16
 _SLOTS = 64  # of a hash table: twice the lanes
+
+
+class FrameShape(NamedTuple):
+    """The frame buffer as threads address it."""
+
+    width: int
+    word_bytes: int
+    words: int  # atomics a fragment
+    plane_bytes: int  # bytes from a fragment's one word to the next
+    unroll: int  # pixels in a turn of the inner loop
 
 
 class Lanes(NamedTuple):
@@ -47,7 +59,7 @@ class Lanes(NamedTuple):
 
 
 @kernel
-def _new_lanes():
+def _new_lanes() -> Any:
     return Lanes(
         np.empty(WARP, np.int64),
         np.empty((WARP, 9), np.int64),
@@ -66,7 +78,7 @@ def _new_lanes():
 
 
 @kernel
-def _count_vertices(triangles, t0, lanes, simt, address, row):
+def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: Any, row: Any) -> None:
     """Count loads of three indices and three positions a lane."""
     for k in range(3):
         for lane in range(lanes):
@@ -80,7 +92,7 @@ def _count_vertices(triangles, t0, lanes, simt, address, row):
 
 
 @kernel
-def _start_rows(pieces, lanes):
+def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
     """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
     active, boxes, most = 0, 0, 0
     for lane in range(WARP):
@@ -97,7 +109,7 @@ def _start_rows(pieces, lanes):
 
 
 @kernel
-def _start_row(pieces, lanes, r, width, unroll):
+def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) -> tuple[int, int, int]:
     """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
 
     That is the most pixels of any beyond a multiple of ``unroll``, and the most turns of ``unroll`` pixels of any.
@@ -121,7 +133,9 @@ def _start_row(pieces, lanes, r, width, unroll):
 
 
 @kernel
-def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
+def _step(
+    pieces: Pieces, lanes: Lanes, active: int, c: int, rest: int, unroll: int, word_bytes: int, ids: Any
+) -> tuple[int, int, int]:
     """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
 
     With ``unroll`` a lane first tests what its row has beyond a multiple of that, in the first ``rest`` steps of the
@@ -153,7 +167,7 @@ def _step(pieces, lanes, active, c, rest, unroll, word_bytes, ids):
 
 
 @kernel
-def _early(lanes, hits, t0, frame, word_bytes, simt, row):
+def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: Simt, row: Any) -> int:
     """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
     count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
     row[FreePipeEvent.READS] += 1
@@ -172,7 +186,7 @@ def _early(lanes, hits, t0, frame, word_bytes, simt, row):
 
 
 @kernel
-def _slot(seen, most, key):
+def _slot(seen: Any, most: Any, key: int) -> int:
     """Place of a key in a hash table; a new one begins with 0."""
     i = key & (_SLOTS - 1)
     while seen[i] != key:
@@ -184,7 +198,7 @@ def _slot(seen, most, key):
 
 
 @kernel
-def _count_atomics(lanes, hits, shape, merge, row, chunks):
+def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: Any, chunks: Any) -> None:
     """One instruction on each plane of the frame buffer, by the rules of ``tilestamp.models.atomics``.
 
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
@@ -212,7 +226,9 @@ def _count_atomics(lanes, hits, shape, merge, row, chunks):
 
 
 @kernel
-def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
+def _scan(
+    pieces: Pieces, lanes: Lanes, t0: int, shape: FrameShape, simt: Simt, row: Any, chunks: Any, frame: Any
+) -> tuple[int, int, int]:
     """Scan the lanes' pieces in lockstep; returns the steps, the rows, and the steps that hit."""
     active, boxes, rows = _start_rows(pieces, lanes)
     steps, hit_steps = 0, 0
@@ -242,18 +258,19 @@ def _scan(pieces, lanes, t0, shape, simt, row, chunks, frame):
     return steps, rows, hit_steps
 
 
-class FrameShape(NamedTuple):
-    """The frame buffer as threads address it."""
-
-    width: int
-    word_bytes: int
-    words: int  # atomics a fragment
-    plane_bytes: int  # bytes from a fragment's one word to the next
-    unroll: int  # pixels in a turn of the inner loop
-
-
 @kernel
-def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, frame):
+def _warp(
+    triangles: Any,
+    pieces: Pieces,
+    t0: int,
+    lanes_in: int,
+    shape: FrameShape,
+    simt: Simt,
+    lanes: Lanes,
+    row: Any,
+    chunks: Any,
+    frame: Any,
+) -> tuple[int, int, int]:
     """One warp, triangles t0..t0+lanes_in-1; returns its steps, its rows, and its steps that hit."""
     row[FreePipeEvent.WARPS] += 1
     row[FreePipeEvent.LANES_IN] += lanes_in
@@ -285,7 +302,18 @@ def _warp(triangles, pieces, t0, lanes_in, shape, simt, lanes, row, chunks, fram
 
 
 @kernel
-def draw_blocks(part, parts, triangles, pieces, block, shape, simt, table, chunks, frame):
+def draw_blocks(
+    part: int,
+    parts: int,
+    triangles: Any,
+    pieces: Pieces,
+    block: int,
+    shape: FrameShape,
+    simt: Simt,
+    table: Any,
+    chunks: Any,
+    frame: Any,
+) -> None:
     """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
     lanes = _new_lanes()
     for b in range(part, table.shape[0], parts):

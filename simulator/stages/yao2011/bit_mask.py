@@ -13,7 +13,7 @@ depth       a set bit filters only if what the patch has at that sample lies in 
 """
 
 from enum import IntEnum
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -124,7 +124,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
 
 
 @kernel
-def _bit_mask(vertices, starts, samples, kind, in_flight, simt, table):
+def _bit_mask(vertices: Any, starts: Any, samples: Samples, kind: int, in_flight: int, simt: Simt, table: Any) -> None:
     """One patch after another; ``kind`` is 0 plain, 1 facing, 2 depth."""
     lanes = (
         np.zeros((in_flight, 6, 4), np.int64),  # edges
@@ -155,7 +155,7 @@ def _bit_mask(vertices, starts, samples, kind, in_flight, simt, table):
 
 
 @kernel
-def _take(vertices, first, last, kind, samples, lanes, row):
+def _take(vertices: Any, first: int, last: int, kind: int, samples: Samples, lanes: Any, row: Any) -> None:
     """Set up the next polygons, a lane each."""
     edges, boxes, depths, snapped, walk, polygon = lanes
     row[BitMaskEvent.SETUP_WARPS] += 1
@@ -173,7 +173,9 @@ def _take(vertices, first, last, kind, samples, lanes, row):
 
 
 @kernel
-def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
+def _step(
+    box: Any, kind: int, shared: Any, samples: Samples, mask: Any, nearest: Any, lanes: Any, simt: Simt, row: Any
+) -> bool:
     """Every lane finds its next clear sample and tests it; returns whether any lane had one."""
     edges, _, depths, _, walk, polygon = lanes
     spp = len(samples.offsets)
@@ -227,7 +229,7 @@ def _step(box, kind, shared, samples, mask, nearest, lanes, simt, row):
 
 
 @kernel
-def _write_mask(mask, words, bits, hits, shared, row):
+def _write_mask(mask: Any, words: Any, bits: Any, hits: int, shared: Any, row: Any) -> None:
     """One atomic or of the warp."""
     flat = mask.reshape(-1)
     for hit in range(hits):

@@ -1,16 +1,20 @@
 """The words of a patch's bit mask: rows of the patch's box, the samples of a row next to each other, 32 to a word."""
 
+from typing import Any
+
 import numpy as np
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import snap
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, pixel_box
 
 WORD = 32  # bits
 
 
 @kernel
-def patch_box(vertices, first, last, boxes, snapped, samples):
+def patch_box(
+    vertices: Any, first: int, last: int, boxes: Any, snapped: Any, samples: Samples
+) -> tuple[int, int, int, int]:
     """Pixels (x0, y0, x1, y1) of a patch's polygons that are on screen; dicing knows the box, so nothing is counted."""
     low_x, low_y, high_x, high_y = samples.width, samples.height, -1, -1
     for p in range(first, last):
@@ -23,7 +27,7 @@ def patch_box(vertices, first, last, boxes, snapped, samples):
 
 
 @kernel
-def new_mask(box, spp, layers, with_depth):
+def new_mask(box: Any, spp: int, layers: int, with_depth: bool) -> tuple[Any, Any]:
     """Make a clear mask (layers, rows, words), and the patch's nearest depths (rows, samples) where they are kept."""
     rows = box[3] - box[1] + 1
     words = -(-(box[2] - box[0] + 1) * spp // WORD)
@@ -32,7 +36,7 @@ def new_mask(box, spp, layers, with_depth):
 
 
 @kernel
-def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
+def next_word(box: Any, spp: int, mask: Any, nearest: Any, in_sequence: Any, walk: Any, depths: Any) -> tuple[int, int]:
     """Read words until one has a sample to test, or the lane's box ends; returns words read, depths looked up.
 
     In sequence, what the patch has at equal depth is an earlier polygon and wins; in flight it may be a later.
@@ -65,6 +69,6 @@ def next_word(box, spp, mask, nearest, in_sequence, walk, depths):
 
 
 @kernel
-def _front(depths):
+def _front(depths: Any) -> Any:
     """Nearest vertex of a polygon: no depth in it is less, even rounded; a triangle repeats vertex 0 in row 1."""
     return np.float32(min(depths[0, 0], depths[0, 1], depths[0, 2], depths[1, 2]))
