@@ -24,11 +24,6 @@ FOREIGN = {  # what they take belongs to a library without types
     "experiments/validation/measuring_sm.py": "CuPy",
 }
 
-    "simulator/run.py",
-    "simulator/intervals.py",
-    "simulator/pipelines/_cudaraster_sampled.py",
-}  # being rewritten
-
 
 def functions(source: str, *, kernels: bool) -> Iterator[ast.FunctionDef]:
     """Functions of a module that are kernels, or that are not."""
@@ -79,11 +74,7 @@ def test_kernels_are_annotated_by_the_rule():
 
 
 def test_only_kernels_take_any():
-    found = {
-        name: takers_of_any((PACKAGE / name).read_text("utf-8"))
-        for name in modules()
-        if name not in FOREIGN
-    }
+    found = {name: takers_of_any((PACKAGE / name).read_text("utf-8")) for name in modules() if name not in FOREIGN}
     assert {name: wrong for name, wrong in found.items() if wrong} == {}
 
 

@@ -58,8 +58,9 @@ def split(
 ) -> Split:
     """Bound and split, and dice."""
     simt = simt or simt_of(MACHINE)
-    limits = {"near": near, "min_depth": min_depth, "max_depth": max_depth}
-    subpatches, works, _ = bound_and_split(points, matrix, width, height, bound, simt, **limits)  # type: ignore[arg-type]
+    subpatches, works, _ = bound_and_split(
+        points, matrix, width, height, bound, simt, near=near, min_depth=min_depth, max_depth=max_depth
+    )
     grids, diced, _ = dice(points, subpatches, matrix, width, height, simt)
     return Split(subpatches, grids, works + diced)
 

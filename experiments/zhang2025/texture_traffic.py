@@ -1,6 +1,7 @@
 """Texture memory traffic: row-major against tiled texels, by minification and by the direction of the rows."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from tilestamp.reports.plots import lines
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
 from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.stages.zhang2025.pixel_shader import Filter
 from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
@@ -20,8 +22,8 @@ MACHINE = "ga104"
 SIZE = 512  # pixels and texels on a side
 MINIFICATIONS = (0.5, 1.0, 2.0, 4.0, 8.0)  # texels a pixel
 ANGLES = (0, 45, 90)  # degrees between the rows of the texture and those of the screen
-FILTERS = ("bilinear", "trilinear")
-LAYOUTS: dict[str, dict[str, str | int]] = {
+FILTERS: tuple[Filter, ...] = ("bilinear", "trilinear")
+LAYOUTS: dict[str, dict[str, Any]] = {
     "rows": {"texture_layout": "rows"},
     "tiles 4x4": {"texture_tile": 4},
     "tiles 8x8": {"texture_tile": 8},
@@ -41,9 +43,9 @@ def wall(minification: float, degrees: int) -> Scene:
     return Scene("wall", mesh=Mesh(positions, triangles, uvs=uvs, texture_ids=ids, textures=(texture,)))
 
 
-def shader(scene: Scene, simt: Simt, layout: str, texture_filter: str) -> Work:
+def shader(scene: Scene, simt: Simt, layout: str, texture_filter: Filter) -> Work:
     """Draw the wall and give the pixel shader's work."""
-    options = BinnedOptions(texture_filter=texture_filter, **LAYOUTS[layout])  # type: ignore[arg-type]  # checked there
+    options = BinnedOptions(texture_filter=texture_filter, **LAYOUTS[layout])
     frame = binned(scene, np.eye(4), SIZE, SIZE, simt, options, Executor())
     return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
 

@@ -58,7 +58,9 @@ class SubPatches(NamedTuple):
 
 
 @kernel
-def _subdivide(part: Any, parts: Any, queue: Any, path: Any, places: Any, target: Any, target_path: Any) -> Any:
+def _subdivide(
+    part: int, parts: int, queue: SubPatches, path: Any, places: Any, target: SubPatches, target_path: Any
+) -> None:
     """Move what is kept, and write the four children of what is split, u first: one part of the queue."""
     for k in range(part * path.shape[0] // parts, (part + 1) * path.shape[0] // parts):
         place = places[k]

@@ -79,7 +79,7 @@ def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any)
 
 
 @kernel(error_model="numpy")
-def _measure(s: Any, width: Any, height: Any, near: Any) -> Any:
+def _measure(s: _Scratch, width: Any, height: Any, near: Any) -> None:
     """Sides of the frustum and boxes of all lanes; a box means nothing where a point lies behind the eye."""
     net, box = s.net, s.box
     s.everywhere[:] = -1
@@ -102,7 +102,7 @@ def _measure(s: Any, width: Any, height: Any, near: Any) -> Any:
 
 
 @kernel
-def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
+def _path(s: _Scratch, n: Any, bound: Any, whole_pixels: Any) -> Any:
     """What was found about lane ``n``."""
     if s.everywhere[n] & _OFF_SCREEN:
         return CULL
@@ -113,8 +113,8 @@ def _path(s: Any, n: Any, bound: Any, whole_pixels: Any) -> Any:
 
 @kernel
 def examine(
-    part: Any,
-    parts: Any,
+    part: int,
+    parts: int,
     side: Any,
     width: Any,
     screen: Any,
@@ -125,7 +125,7 @@ def examine(
     whole_pixels: Any,
     min_depth: Any,
     max_depth: Any,
-) -> Any:
+) -> None:
     """Examine one part of the queue, ``width`` (LANES) at once; a sub-patch that was kept before is kept again.
 
     ``size`` is width and height of the screen in pixels, and the nearest w that is drawn.

@@ -16,6 +16,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import Known
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
+    BlockShape,
     TileRasterEvent,
     block_shape,
     block_traffic,
@@ -36,7 +37,7 @@ LISTED = (  # events that follow from the lists
 
 @kernel
 def _add_grids(
-    part: Any, parts: Any, vertices: Any, count: Any, start: Any, lists: Any, tiles: Any, known: Any
+    part: int, parts: int, vertices: Any, count: Any, start: Any, lists: Any, tiles: Tiles, known: Any
 ) -> None:
     """Pixels of boxes and of grids in each tile of one part; a grid's area is that of its two triangles."""
     for t in range(count.size * part // parts, count.size * (part + 1) // parts):
@@ -56,7 +57,7 @@ def _add_grids(
 
 @kernel
 def _count_lists(
-    part: Any, parts: Any, count: Any, start: Any, lists: Any, tiles: Any, shape: Any, traffic: Any, size: Any,
+    part: int, parts: int, count: Any, start: Any, lists: Any, tiles: Tiles, shape: BlockShape, traffic: Any, size: Any,
     table: Any,
 ) -> None:  # fmt: skip
     """Rows of the tiles of one part, had no grid a quad in its tile."""
