@@ -132,7 +132,9 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
     return machine
 
 
-def altered(machine: Machine, values: Mapping[str, Any], provenance: Provenance, source: str) -> Machine:
+def altered(
+    machine: Machine, values: Mapping[str, Any], provenance: Provenance = "assumed", source: str = "a what-if"
+) -> Machine:
     """Return the machine with other numbers: a what-if, or a fit.
 
     Parameters
