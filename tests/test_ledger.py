@@ -1,8 +1,13 @@
 """Counts, prices and reported figures are those of the ledger; where one is meant to change, write it anew."""
 
+import importlib
+import pkgutil
+from enum import IntEnum
+
 import pytest
 
 from tests.ledger import book, frames
+from tilestamp.simulator import stages
 from tilestamp.simulator.pipelines import pipeline_names
 
 HINT = "where that is meant: python -m tests.ledger, and say why in the commit"
@@ -13,6 +18,25 @@ SHOWN = 30
 def test_counts_and_prices_of_small_frames_are_those_of_the_ledger(pipeline):
     found = book.differences(book.read(book.FOLDER / "frames" / f"{pipeline}.csv"), frames.entries(pipeline))
     assert not found, "\n".join([f"{len(found)} numbers differ", *found[:SHOWN], HINT])
+
+
+@pytest.mark.parametrize("pipeline", pipeline_names())
+def test_every_event_of_a_pipeline_occurs_in_the_ledger(pipeline):
+    """Else no frame of the ledger would tell of a change in it."""
+    assert frames.silent_events(pipeline) == set()
+
+
+def test_every_stage_is_run_in_the_ledger():
+    run = {kind for pipeline in pipeline_names() for kind in frames.event_kinds(pipeline)}
+    assert _event_kinds() - run == {"MotionEvent"}  # of experiments alone: see test_motion.py
+
+
+def _event_kinds() -> set[str]:
+    """Names of all enums of events of the stages."""
+    found = pkgutil.walk_packages(stages.__path__, f"{stages.__name__}.")
+    values = [value for module in found for value in vars(importlib.import_module(module.name)).values()]
+    kinds = {value.__name__ for value in values if isinstance(value, type) and issubclass(value, IntEnum)}
+    return {kind for kind in kinds if kind.endswith("Event")} - {"MachineEvent"}
 
 
 def test_a_count_that_changes_by_one_is_seen():

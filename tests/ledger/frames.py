@@ -2,17 +2,21 @@
 
 import hashlib
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.ledger.scenes import GENERATED
 from tilestamp import Run, TilestampError, simulate
 from tilestamp.models.events import MachineEvent
+from tilestamp.simulator.work import Work
 
 WIDTH, HEIGHT = 96, 72
 FAMILIES = ("gtx280", "gtx480", "gtx680", "ga104", "h200")  # compute capability 1, 2, 3, 8, 9
 CHAIN = tuple(event for event in MachineEvent if event.name.startswith("CHAIN"))
 TEXTURED = ("tiled", "per-primitive", "binned")  # these draw a textured mesh too
+TEXTURE = np.arange(8 * 8 * 3, dtype=np.uint8).reshape(8, 8, 3)
 VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
     "micropolygon": (
         ("gtx280", {"tile": 4, "spp": 4}),
@@ -51,39 +55,108 @@ class Frame(NamedTuple):
     scene: str
     machine: str
     options: dict[str, Any]
+    size: tuple[int, int] = (WIDTH, HEIGHT)
 
     @property
     def label(self) -> str:
         """As the ledger names it."""
-        return " ".join([self.scene, self.machine, *(f"{name}={value}" for name, value in self.options.items())])
+        size = () if self.size == (WIDTH, HEIGHT) else (f"{self.size[0]}x{self.size[1]}",)
+        options = (name if isinstance(value, np.ndarray) else f"{name}={value}" for name, value in self.options.items())
+        return " ".join([self.scene, self.machine, *size, *options])
 
     def run(self) -> Run:
         """Execute and price it."""
-        return simulate(self.scene, self.pipeline, self.machine, width=WIDTH, height=HEIGHT, **self.options)
+        scene, (width, height) = GENERATED.get(self.scene, self.scene), self.size
+        return simulate(scene, self.pipeline, self.machine, width=width, height=height, **self.options)
+
+
+SOUP, EYE, CROWDS = "textured soup", "patches at the eye", "crowds"
+GENERATED_FRAMES = (
+    Frame("micropolygon", EYE, "gtx280", {"bound": 16.0, "texture": TEXTURE}),
+    Frame("micropolygon", EYE, "h200", {"near": 0.2, "spp": 4}),
+    Frame("micropolygon", "teapot", "gtx480", {"tile": 4, "bound": 16.0}, (200, 150)),  # sums of blocks to add
+    Frame("cudaraster", SOUP, "gtx480", {"msaa": 2}),
+    Frame("cudaraster", CROWDS, "gtx480", {"cull_backfaces": False, "guard_band": False}, (300, 200)),
+    Frame("cudaraster", CROWDS, "h200", {"release": "nvdiffrast"}, (520, 520)),
+    Frame("cudaraster", "cut into six", "gtx480", {"guard_band": False, "first_frame": True}, (24, 24)),
+    Frame("freepipe", SOUP, "gtx480", {"early": True}),
+    Frame("freepipe", SOUP, "h200", {"packing": "32", "block": 64}),
+    Frame("hardware", SOUP, "gtx480", {}),
+    Frame("stamps", SOUP, "gtx280", {"coarse": 16, "spp": 4}),
+    Frame("stamps", EYE, "h200", {"edge": 4.0}),
+    Frame("across-polygons", SOUP, "gtx280", {"packing": "sorted"}),
+    Frame("across-polygons", EYE, "h200", {"packing": "repacked", "edge": 4.0, "triangles": True}),
+    Frame("bit-mask", EYE, "gtx280", {"mask": "depth", "edge": 4.0, "spp": 16}),
+    Frame("bit-mask", EYE, "gtx480", {"mask": "facing", "edge": 4.0}),
+    Frame("bit-mask", SOUP, "h200", {"group": 16, "lanes": 8}),
+    Frame("tiled", SOUP, "gtx680", {}),
+    Frame("per-primitive", SOUP, "gtx680", {}),
+    Frame("binned", SOUP, "ga104", {"fragment_depth": "stepped"}),
+    Frame("binned", SOUP, "h200", {"order": "oit", "texture_filter": "bilinear", "cull_backfaces": False}),
+    Frame("binned", SOUP, "h200", {"optimized": False, "texture_layout": "rows", "texture_filter": "nearest"}),
+)
 
 
 def frames(pipeline: str) -> list[Frame]:
-    """Frames of a pipeline: one on a machine of each family, then its variants."""
+    """Frames of a pipeline: one on a machine of each family, its variants, and those of generated scenes."""
     scenes = ("teapot", "spot") if pipeline in TEXTURED else ("teapot",)
     made = [Frame(pipeline, scene, machine, {}) for scene in scenes for machine in FAMILIES]
-    return made + [Frame(pipeline, "teapot", machine, options) for machine, options in VARIANTS.get(pipeline, ())]
+    made += [Frame(pipeline, "teapot", machine, options) for machine, options in VARIANTS.get(pipeline, ())]
+    return made + [frame for frame in GENERATED_FRAMES if frame.pipeline == pipeline]
+
+
+@cache
+def runs(pipeline: str) -> tuple[tuple[Frame, Run | TilestampError], ...]:
+    """Each frame of a pipeline with its run, or with the error that says why the machine cannot run it."""
+    return tuple((frame, _run(frame)) for frame in frames(pipeline))
+
+
+def _run(frame: Frame) -> Run | TilestampError:
+    try:
+        return frame.run()
+    except TilestampError as error:
+        return error
+
+
+def _works(pipeline: str) -> Iterator[Work]:
+    """Works of all frames of a pipeline."""
+    for _, run in runs(pipeline):
+        if isinstance(run, Run):
+            yield from (work for work in run.frame.works if isinstance(work, Work))
+
+
+def event_kinds(pipeline: str) -> set[str]:
+    """Enums of the events that a pipeline's stages count, by name."""
+    return {work.events.__name__ for work in _works(pipeline)}
+
+
+def silent_events(pipeline: str) -> set[str]:
+    """Events of the pipeline's stages that are zero in all its frames."""
+    totals: dict[str, int] = {}
+    for work in _works(pipeline):
+        for name, count in work.counts().items():
+            event = f"{work.events.__name__}.{name}"
+            totals[event] = totals.get(event, 0) + count
+    return {event for event, total in totals.items() if not total}
 
 
 def entries(pipeline: str) -> dict[tuple[str, str, str], str]:
     """Every number of a pipeline's frames: (frame, kernel, quantity) -> value as text."""
     return {
         (frame.label, kernel, quantity): value
-        for frame in frames(pipeline)
-        for kernel, quantity, value in _frame_entries(frame)
+        for frame, run in runs(pipeline)
+        for kernel, quantity, value in _frame_entries(run)
     }
 
 
-def _frame_entries(frame: Frame) -> Iterator[tuple[str, str, str]]:
+def _frame_entries(run: Run | TilestampError) -> Iterator[tuple[str, str, str]]:
     """Numbers of one frame; where the machine cannot run the pipeline, the sentence that says why."""
+    if isinstance(run, TilestampError):
+        yield "frame", "refused", str(run)
+        return
     try:
-        run = frame.run()
         yield from _run_entries(run)
-    except TilestampError as error:
+    except TilestampError as error:  # no mix for the machine
         yield "frame", "refused", str(error)
 
 

@@ -63,10 +63,9 @@ class StampsEvent(IntEnum):
     HIT_WARPS = 11  # warp executions of depth and atomic
     ATOMIC_LANES = 12
     ATOMIC_REQUESTS = 13
-    ATOMIC_CONFLICTS = 14
-    ATOMIC_DEPTH = 15
-    LOAD_TRANSACTIONS = 16
-    LOAD_BYTES = 17
+    ATOMIC_DEPTH = 14  # 1 each: the lanes test different samples of one polygon
+    LOAD_TRANSACTIONS = 15
+    LOAD_BYTES = 16
 
 
 class StampShape(NamedTuple):
@@ -261,11 +260,10 @@ def _end_warp(samples: Samples, simt: Simt, row: Any, addresses: Any, used: int,
 
 @kernel
 def _count_hits(samples: Samples, addresses: Any, hits: int, merge: int, row: Any) -> None:
-    lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, merge)
+    lanes, requests, _, depth = count_hits(samples, addresses, hits, merge)
     row[StampsEvent.HIT_WARPS] += 1
     row[StampsEvent.ATOMIC_LANES] += lanes
     row[StampsEvent.ATOMIC_REQUESTS] += requests
-    row[StampsEvent.ATOMIC_CONFLICTS] += conflicts
     row[StampsEvent.ATOMIC_DEPTH] += depth
 
 
