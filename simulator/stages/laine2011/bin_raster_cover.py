@@ -155,9 +155,8 @@ def header_load(slot: Any, lanes: int, segment_bytes: int) -> tuple[int, int]:
         new = True
         for other in range(lane - 1, lane - lane % together - 1, -1):
             there = slot[other] * HEADER_BYTES // segment_bytes
-            if there == here:
+            if there == here:  # slots mostly ascend, but runs of clipped triangles stand in between
                 new = False
-            if there <= here:  # slots mostly ascend: nothing nearer lies further back
                 break
         distinct += new
     return distinct, distinct * segment_bytes
