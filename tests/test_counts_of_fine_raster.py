@@ -1,0 +1,42 @@
+"""Every event of fine raster against Python, in both releases, all modes, one sample a pixel and several."""
+
+import pytest
+
+from tests import naive_fine
+from tests.test_counts_of_warps import nonzero
+from tests.test_fine_raster import MODES, mesh_soup
+from tests.tile_lists import box_lists
+from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.stages.laine2011 import fine_raster as stage
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
+
+LINES, SECTORS = Simt(coalescing=Coalescing.WARP_LINES, sms=2), Simt(coalescing=Coalescing.WARP_SECTORS, sms=2)
+
+
+@pytest.mark.parametrize("simt", [LINES, SECTORS], ids=["lines", "sectors"])
+@pytest.mark.parametrize(
+    ("release", "samples", "mode"),
+    [
+        ("1.1", 1, "depth"),
+        ("1.1", 1, "blend"),
+        ("1.1", 1, "color"),
+        ("1.1", 1, "depth-only"),
+        ("nvdiffrast", 1, "depth"),
+        ("1.1", 4, "depth"),
+        ("1.1", 2, "blend"),
+        ("1.1", 8, "color"),
+        ("1.1", 2, "depth-only"),
+    ],
+)
+def test_fine_raster(release, samples, mode, simt):
+    size = (20, 13)
+    depth, interpolate = MODES[mode]
+    positions, triangles = mesh_soup(2, count=60, spread=1.2, near=0.3)
+    setup, _, _ = triangle_setup(
+        positions, triangles, *size, simt, release=release, samples=samples, depth=depth, interpolate=interpolate
+    )
+    starts, entries, active = box_lists(setup, *size)
+    options = {"release": release, "samples": samples, "mode": mode}
+    _, work = stage.fine_raster(setup, starts, entries, active, *size, simt, **options)
+    job = naive_fine.Job(setup, *size, simt, release == "nvdiffrast", samples, *stage.MODES[mode])
+    assert nonzero(work.counts()) == nonzero(naive_fine.fine(job, starts, entries, active))
