@@ -1,4 +1,7 @@
-"""``python -m tests.mutation [ROOM ...] [--number N] [--jobs N]``: make mutants, and see which the tests notice."""
+"""``python -m tests.mutation [ROOM ...] [--number N] [--jobs N]``: make mutants, and see which the tests notice.
+
+``--without-ledger`` asks the other tests alone: who judges a number, and does not only hold it as it was?
+"""
 
 import argparse
 import shutil
@@ -11,7 +14,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from tests.mutation.mutants import ROOT, Mutant, sample
-from tests.mutation.rooms import ROOMS
+from tests.mutation.rooms import LEDGER, ROOMS
 
 SURVIVORS = Path(__file__).parent / "survivors.toml"  # name of a mutant = why no test need notice it
 COPIED = ("models", "simulator", "experiments", "reports", "tests", "tilestamp", "docs", "pyproject.toml", "README.md")
@@ -26,6 +29,7 @@ def main() -> int:
     arguments.add_argument("--number", type=int, help="mutants of each room")
     arguments.add_argument("--jobs", type=int, default=2)
     arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--without-ledger", action="store_true", help="the other tests alone")
     asked = arguments.parse_args()
     mutants = [
         mutant
@@ -38,7 +42,7 @@ def main() -> int:
         for job in range(asked.jobs):
             copies.put(_copy(Path(scratch) / str(job)))
         with ThreadPoolExecutor(asked.jobs) as pool:
-            noticed = list(pool.map(lambda mutant: _try(mutant, copies), mutants))
+            noticed = list(pool.map(lambda mutant: _try(mutant, copies, asked.without_ledger), mutants))
     return _report(mutants, noticed, excused)
 
 
@@ -56,14 +60,17 @@ def _copy(folder: Path) -> Path:
     return folder
 
 
-def _try(mutant: Mutant, copies: "SimpleQueue[Path]") -> bool:
+def _try(mutant: Mutant, copies: "SimpleQueue[Path]", without_ledger: bool) -> bool:
     """Whether a test notices the mutant."""
+    tests = [test for test in ROOMS[mutant.room].tests(mutant.path) if not (without_ledger and LEDGER in test)]
+    if not tests:
+        return _said(mutant, noticed=False)
     folder = copies.get()
     path = folder / mutant.path
     kept = path.read_text("utf-8")
     try:
         path.write_text(mutant.text, "utf-8")
-        command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", *ROOMS[mutant.room].tests(mutant.path)]
+        command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", *tests]
         done = subprocess.run(command, cwd=folder, capture_output=True, timeout=SECONDS, check=False)  # noqa: S603
         noticed = done.returncode not in {0, NO_TESTS}
     except subprocess.TimeoutExpired:
@@ -71,6 +78,10 @@ def _try(mutant: Mutant, copies: "SimpleQueue[Path]") -> bool:
     finally:
         path.write_text(kept, "utf-8")
         copies.put(folder)
+    return _said(mutant, noticed=noticed)
+
+
+def _said(mutant: Mutant, *, noticed: bool) -> bool:
     sys.stdout.write(f"{'noticed ' if noticed else 'SURVIVED'} {mutant.room}: {mutant.name}\n")
     sys.stdout.flush()
     return noticed

@@ -8,6 +8,8 @@ from tests.mutation.mutants import ROOT
 from tilestamp.simulator.pipelines import pipeline_names
 
 LEDGER = "tests/test_ledger.py"
+SLOW = {"test_architecture", "test_frontier_methods", "test_silicon", "test_stability_overflow"}
+PIPELINE_TESTS = {"ru2016": ("tests/test_textured_mesh.py",), "zhang2025": ("tests/test_textured_mesh.py",)}
 STAGES = {  # folder of stages: pipelines that run them
     "eisenacher2010": ("micropolygon",),
     "laine2011": ("cudaraster",),
@@ -30,7 +32,7 @@ class Room:
     number : int
         Mutants that are drawn.
     tests : callable
-        Arguments of pytest by the mutated file.
+        Arguments of pytest by the mutated file: the ledger's and others.
     """
 
     globs: tuple[str, ...]
@@ -47,13 +49,13 @@ def _named(path: str) -> list[str]:
     """Test files that bear the name of a module, or speak of it."""
     module = Path(path).stem
     dotted = path.removesuffix(".py").replace("/", ".")
-    files = sorted((ROOT / "tests").glob("test_*.py"))
-    chosen = [
-        file
-        for file in files
-        if module in file.stem or f"{dotted} " in (text := file.read_text()) or f"{dotted}\n" in text
-    ]
-    return [file.relative_to(ROOT).as_posix() for file in chosen if "packaging" not in file.name]
+    return _tests(lambda file, text: module in file.stem or f"{dotted} " in text or f"{dotted}\n" in text)
+
+
+def _tests(fits: Callable[[Path, str], bool]) -> list[str]:
+    """Test files that fit."""
+    files = [file for file in sorted((ROOT / "tests").glob("test_*.py")) if "packaging" not in file.name]
+    return [file.relative_to(ROOT).as_posix() for file in files if fits(file, file.read_text())]
 
 
 def _ledger(*pipelines: str) -> list[str]:
@@ -65,7 +67,10 @@ def _of_mix(path: str) -> list[str]:
 
 
 def _of_stage(path: str) -> list[str]:
-    return [*_ledger(*STAGES.get(Path(path).parent.name, pipeline_names())), *_named(path)]
+    folder = Path(path).parent.name
+    pipelines = STAGES.get(folder, pipeline_names())
+    beside = _tests(lambda file, text: f"stages.{folder}" in text and file.stem not in SLOW)
+    return [*_ledger(*pipelines), *dict.fromkeys([*_named(path), *beside, *PIPELINE_TESTS.get(folder, ())])]
 
 
 def _of_models(path: str) -> list[str]:
@@ -80,6 +85,10 @@ def _of_machine(path: str) -> list[str]:
     ]
 
 
+def _of_report(path: str) -> list[str]:
+    return list(dict.fromkeys(["tests/test_known_errors.py", "tests/test_results.py", *_named(path)]))
+
+
 ROOMS = {
     "rules": Room(("models/*.py",), 90, _of_models),
     "counters": Room(("simulator/stages/*/*.py", "simulator/stages/*.py"), 70, _of_stage),
@@ -88,5 +97,7 @@ ROOMS = {
         tuple(f"models/machines/{name}.toml" for name in ("gtx280", "gtx480", "gtx680", "h200")), 20, _of_machine
     ),
     "drivers": Room(("simulator/stages/*/*.py", "simulator/*.py"), 40, _of_stage),
-    "reports": Room(("experiments/shared/*.py", "reports/*.py"), 30, _named),
+    "reports": Room(
+        ("experiments/harness/*.py", "experiments/commands/reproduce.py", "reports/page.py"), 30, _of_report
+    ),
 }
