@@ -9,7 +9,7 @@ from multiprocessing import active_children
 import pytest
 
 from tilestamp.experiments.command_line import run_command
-from tilestamp.experiments.harness.jobs import run_experiments
+from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
 from tilestamp.experiments.harness.result import Result
 from tilestamp.models.errors import MissingInputError
 
@@ -30,6 +30,12 @@ def result(name):
 
 def missing(_say):
     raise MissingInputError("put bunny.ply into a folder")
+
+
+@pytest.mark.parametrize(("cores", "jobs"), [(None, 1), (1, 1), (2, 2), (64, 2)])
+def test_two_processes_at_most_where_nothing_is_said(cores, jobs, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    assert default_jobs() == jobs
 
 
 def test_one_job_runs_in_this_process(experiments, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import MachineEvent
-from tilestamp.simulator.mix import MIXES, PROVENANCES, KernelMix, load_mix
+from tilestamp.simulator.mix import MIXES, PROVENANCES, KernelMix, Mix, load_mix
 from tilestamp.simulator.work import Work
 
 pytestmark = pytest.mark.small
@@ -64,6 +64,36 @@ def test_a_kernel_without_a_mix_is_refused():
     work = Work(stage="s", kernel="unknown", events=Event, table=np.zeros((1, 3), np.int64), grid=1, block=32)
     with pytest.raises(TilestampError, match="unknown"):
         load_mix("micropolygon", "1.3").launch(work, 32)
+
+
+def test_a_launch_has_the_works_shape_and_the_mixs_prices():
+    mix = Mix("p/cc1", {"k": KernelMix("k", 21, 100, {"STEPS": {"fp32": 3, "shared": 2}}, {})}, "")
+    table = np.array([[1, 32, 5], [2, 40, 7]], np.int64)
+    work = Work(stage="s", kernel="k", events=Event, table=table, grid=2, block=64, shared_bytes=16)
+    launch = mix.launch(work, 32)
+    assert (launch.registers, launch.shared_bytes, launch.grid, launch.block) == (21, 116, 2, 64)
+    columns = [MachineEvent.FP32, MachineEvent.SHARED, MachineEvent.LANES, MachineEvent.LOAD_TRANSACTIONS]
+    assert launch.events[:, columns].tolist() == [[3, 2, 5 * 32, 5], [6, 4, 10 * 32, 7]]
+
+
+def test_a_variant_with_a_table_of_its_own_takes_that():
+    kernels = {name: KernelMix(name, size, 0, {}, {}) for name, size in (("k", 10), ("k: tile 8", 20))}
+    mix = Mix("p/cc1", kernels, "")
+    work = {"stage": "s", "kernel": "k", "events": Event, "table": np.zeros((1, 3), np.int64), "grid": 1, "block": 32}
+    registers = [mix.launch(Work(**work, variant=variant), 32).registers for variant in ("", "tile 8", "tile 4")]
+    assert registers == [10, 20, 10]
+
+
+def test_an_event_of_instructions_that_passes_through_is_one_instruction_of_its_lanes():
+    kind = IntEnum("kind", {"ATOMIC": 0, "ATOMIC_LANES": 1})
+    matrix = kernel(ATOMIC={"int32": 2, "lanes": "ATOMIC_LANES"}).matrix(kind, 32)
+    assert matrix[kind.ATOMIC, MachineEvent.ATOMIC] == 1
+    assert matrix[kind.ATOMIC_LANES, MachineEvent.LANES] == 3
+
+
+@pytest.mark.parametrize(("capability", "family"), [("1.3", "cc1"), ("3.0", "cc1"), ("8.6", "cc1"), ("9.0", "cc9")])
+def test_the_newest_family_that_is_not_newer_is_taken(capability, family):
+    assert load_mix("micropolygon", capability).name == f"micropolygon/{family}"
 
 
 def test_an_older_machine_takes_the_oldest_family():

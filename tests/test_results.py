@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow, select
+from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow, process_of, select
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.write import cell_texts, write_index, write_result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result
@@ -47,6 +47,10 @@ def test_an_order_that_differs_is_missed():
     assert cell("a < b", "b < a").error is None
 
 
+def test_a_cell_is_predicted_unless_it_says_so():
+    assert Cell("row", "column", "ms", published=1.0, ours=2.0).status == "predicted"
+
+
 def test_texts_show_error_and_status():
     assert "+10.0 %" in cell_texts(cell())
     assert "fitted" in cell_texts(cell(status="fitted"))
@@ -81,6 +85,11 @@ def test_nothing_named_is_what_is_quick():
     assert select((), everything=True) == experiment_names()
 
 
+def test_experiments_that_share_frames_share_a_process():
+    assert process_of("eisenacher2010/table1") == process_of("eisenacher2010/table2") == "eisenacher2010"
+    assert process_of("silicon/h200") == "silicon/h200"
+
+
 def test_an_unknown_experiment_is_refused():
     with pytest.raises(TilestampError, match="nothing-such"):
         select(("nothing-such",))
@@ -100,6 +109,7 @@ def test_all_boundaries_of_a_folder_are_one_table(tmp_path):
     results = [broken("races", "per-primitive", 1, 2), result(cell(ours=1.0)), broken("layers", "tiled", 64, None)]
     page = write_index(results, tmp_path).read_text()
     table = pd.read_csv(tmp_path / "stability.csv")
+    assert table.columns[0] == "experiment"
     assert table.experiment.tolist() == ["stability/races", "stability/layers"]
     assert table.holds.tolist() == [1, 64]
     assert page.count('<table class="overview">') == 1
