@@ -61,6 +61,25 @@ def test_primitive_assembly(made):
     assert nonzero(made["PrimitiveAssembly"].counts()) == expected | sectors(load=3 * 9 * COUNT, store=28 * COUNT)
 
 
+def test_only_triangles_that_are_cut_into_pieces_take_further_slots():
+    """One whole, one outside, one of which a corner is left, one that loses a corner, and one that faces away."""
+    corners = [
+        [(-0.5, -0.5), (0.5, -0.5), (0.0, 0.5)],
+        [(2.0, 0.0), (3.0, 0.0), (2.0, 1.0)],
+        [(0.5, 0.0), (1.5, -0.2), (1.5, 0.2)],
+        [(0.0, 0.0), (1.5, 0.0), (0.0, 0.5)],
+        [(-0.5, -0.5), (0.0, 0.5), (0.5, -0.5)],
+    ]
+    positions = np.concatenate([np.reshape(corners, (15, 2)), np.tile([0.0, 1.0], (15, 1))], axis=1)
+    mesh = Mesh(positions.astype(np.float32), np.arange(15, dtype=np.int32).reshape(-1, 3))
+    frame = binned(Scene("five", mesh=mesh), np.eye(4), SIDE, SIDE, SIMT, BinnedOptions())
+    counts = next(work for work in frame.works if work.stage == "PrimitiveAssembly").counts()
+    pieces = 1 + 1 + 1 + 2 + 1  # of the outside one, the mark in its slot
+    assert {name: n for name, n in nonzero(counts).items() if "TRANS" not in name and "BYTES" not in name} == {
+        "WARPS": 1, "WARP_LANES": 5, "CLIPPED": 1, "CULLED": 2, "PIECES": pieces, **atomics(1),
+    }  # fmt: skip
+
+
 def test_primitive_compaction(made):
     """A launch covers four slots a triangle: 160, one block of 8 warps, each of which reads the numbers of 32."""
     expected = {"WARPS": 8, "KEPT": COUNT, "GRID_SYNC": 2}

@@ -35,7 +35,7 @@ class PrimitiveAssemblyEvent(IntEnum):
 
     WARPS = 0
     WARP_LANES = 1
-    CLIPPED = 2  # lanes whose triangle crosses a plane
+    CLIPPED = 2  # lanes whose triangle is cut into pieces, which need slots beyond its own
     CULLED = 3  # lanes whose triangle is outside or faces away
     PIECES = 4  # primitives written
     ATOMIC = 5
@@ -90,9 +90,9 @@ def _put(
 @kernel(error_model="numpy")
 def _primitive_assembly(
     clip: Any, varyings: Any, triangles: Any, width: Any, height: Any, culling: bool,
-    screen: Any, out_varyings: Any, ids: Any, events: Any,
+    screen: Any, out_varyings: Any, ids: Any, clipped: Any, events: Any,
 ) -> int:  # fmt: skip
-    """Assemble all triangles; returns the slots in use."""
+    """Assemble all triangles, and mark those that are cut into pieces; returns the slots in use."""
     polygon = np.empty((MOST_VERTICES, 4 + varyings.shape[1]), np.float32)
     scratch = np.empty_like(polygon)
     used = len(triangles)
@@ -106,17 +106,18 @@ def _primitive_assembly(
             some |= code
         count = 0 if every else 3 if some == 0 else clip_polygon(polygon, scratch, 3)
         ids[t] = -1
+        clipped[t] = count > 3
         pieces = 0
         for j in range(1, count - 1):
             slot = t if count == 3 else used
             front = _put(polygon, 0, j, j + 1, width, height, culling, screen[slot], out_varyings[slot])
             ids[slot] = t if front else -1
             pieces += front
-            used += count > 3
+            used += clipped[t]
         if events is not None:
             row = events[t // BLOCK]
             row[PrimitiveAssemblyEvent.WARP_LANES] += 1
-            row[PrimitiveAssemblyEvent.CLIPPED] += count > 3
+            row[PrimitiveAssemblyEvent.CLIPPED] += clipped[t]
             row[PrimitiveAssemblyEvent.CULLED] += pieces == 0
             row[PrimitiveAssemblyEvent.PIECES] += max(1, count - 2)
     return used
@@ -175,8 +176,10 @@ def primitive_assembly(
     )
     blocks = max(1, -(-count // BLOCK))
     events = np.zeros((blocks, len(PrimitiveAssemblyEvent)), np.int64)
-    used = _primitive_assembly(*vertices, mesh.triangles, np.float32(width), np.float32(height), culling, *out, events)
-    _count_memory(mesh.triangles, crossing, simt.warp, int(simt.coalescing), int(simt.atomic_merge), events)
+    clipped = np.zeros(count, np.bool_)
+    size = np.float32(width), np.float32(height)
+    used = _primitive_assembly(*vertices, mesh.triangles, *size, culling, *out, clipped, events)
+    _count_memory(mesh.triangles, clipped, simt.warp, int(simt.coalescing), int(simt.atomic_merge), events)
     segment = smallest_transaction_bytes(int(simt.coalescing))
     stores = events[:, PrimitiveAssemblyEvent.PIECES] * (PRIMITIVE_BYTES // 4)  # a lane's words lie 112 bytes apart
     events[:, PrimitiveAssemblyEvent.STORE_TRANSACTIONS] = stores
