@@ -121,7 +121,7 @@ def test_where_blind_atomics_are_no_faster_all_go_at_one_rate():
 
 def test_bytes_are_shared_by_what_each_unit_moves():
     what = launch(units=2, LOAD_BYTES=100)
-    what.events[1, E.LOAD_BYTES] = 300
+    what.events[1, E.STORE_BYTES] = 200
     units = demand(what, MACHINE, Traffic(800.0, 640.0, 0.0))
     assert units.dram.tolist() == [800 / 50 / 4, 800 / 50 * 3 / 4]  # 100 GB/s, of which half: 50 bytes a cycle
     assert units.l2.tolist() == [2.5, 7.5]

@@ -8,6 +8,7 @@ from tests.mutation.mutants import ROOT
 from tilestamp.simulator.pipelines import pipeline_names
 
 LEDGER = "tests/test_ledger.py"
+PLUMBING = ("kernel", "kernel_digest", "compile_cache", "used", "errors")  # of models: no rule of a machine
 SLOW = {"test_architecture", "test_frontier_methods", "test_silicon", "test_stability_overflow"}
 PIPELINE_TESTS = {"ru2016": ("tests/test_textured_mesh.py",), "zhang2025": ("tests/test_textured_mesh.py",)}
 STAGES = {  # folder of stages: pipelines that run them
@@ -31,6 +32,8 @@ class Room:
         The files, from the root.
     number : int
         Mutants that are drawn.
+    without : tuple of str
+        Files among them that are none of this kind.
     tests : callable
         Arguments of pytest by the mutated file: the ledger's and others.
     """
@@ -38,10 +41,11 @@ class Room:
     globs: tuple[str, ...]
     number: int
     tests: Callable[[str], list[str]]
+    without: tuple[str, ...] = ()
 
     def paths(self) -> list[str]:
         """The files."""
-        found = {path for glob in self.globs for path in ROOT.glob(glob)}
+        found = {path for glob in self.globs for path in ROOT.glob(glob) if path.stem not in self.without}
         return sorted(path.relative_to(ROOT).as_posix() for path in found)
 
 
@@ -74,7 +78,11 @@ def _of_stage(path: str) -> list[str]:
 
 
 def _of_models(path: str) -> list[str]:
-    return [*_named(path), *_ledger("freepipe", "micropolygon", "binned", "hardware", "cudaraster", "tiled")]
+    by_hand = ["tests/test_prices_by_hand.py", "tests/test_bounds.py", "tests/test_machines.py"]
+    return [
+        *dict.fromkeys([*_named(path), *by_hand]),
+        *_ledger("freepipe", "micropolygon", "binned", "hardware", "cudaraster", "tiled"),
+    ]
 
 
 def _of_machine(path: str) -> list[str]:
@@ -90,7 +98,7 @@ def _of_report(path: str) -> list[str]:
 
 
 ROOMS = {
-    "rules": Room(("models/*.py",), 90, _of_models),
+    "rules": Room(("models/*.py",), 90, _of_models, PLUMBING),
     "counters": Room(("simulator/stages/*/*.py", "simulator/stages/*.py"), 70, _of_stage),
     "prices": Room(("simulator/mixes/*/*.toml",), 40, _of_mix),
     "machines": Room(
