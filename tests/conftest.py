@@ -17,6 +17,13 @@ def shared_folder() -> Path:
     return Path(named) if named else Path(__file__).resolve().parent.parent.parent / "shared"
 
 
+def real_scenes() -> str:
+    """Search path of the real scenes; empty where they are not beside the project."""
+    scenes = shared_folder() / "scenes"
+    folders = [scenes, *sorted(path for path in scenes.iterdir() if path.is_dir())] if scenes.is_dir() else []
+    return os.pathsep.join(map(str, folders))
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Give the folder of real scenes and measurements; skip where it is missing."""
@@ -29,12 +36,10 @@ def shared() -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _scene_search_path() -> Iterator[None]:
     """Put the real scenes on the search path for the whole session, unless the caller has set one."""
-    scenes = shared_folder() / "scenes"
-    if not scenes.is_dir() or SCENES_VARIABLE in os.environ:
+    if not real_scenes() or SCENES_VARIABLE in os.environ:
         yield
         return
-    folders = [scenes, *sorted(path for path in scenes.iterdir() if path.is_dir())]
-    os.environ[SCENES_VARIABLE] = os.pathsep.join(map(str, folders))
+    os.environ[SCENES_VARIABLE] = real_scenes()
     yield
     del os.environ[SCENES_VARIABLE]
 

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import pytest
 
-from tests.ledger import book, frames
+from tests.ledger import book, cells, frames
 from tilestamp.simulator import stages
 from tilestamp.simulator.pipelines import pipeline_names
 
@@ -18,6 +18,21 @@ SHOWN = 30
 def test_counts_and_prices_of_small_frames_are_those_of_the_ledger(pipeline):
     found = book.differences(book.read(book.FOLDER / "frames" / f"{pipeline}.csv"), frames.entries(pipeline))
     assert not found, "\n".join([f"{len(found)} numbers differ", *found[:SHOWN], HINT])
+
+
+@pytest.mark.shared
+@pytest.mark.usefixtures("shared")
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in cells.QUICK else pytest.mark.cells) for name in cells.experiments()],
+)
+def test_cells_of_experiments_are_those_of_the_ledger(name):
+    path = book.FOLDER / "cells" / f"{cells.file_name(name)}.csv"
+    assert path.exists(), f"not in the ledger yet: python -m tests.ledger --cells {name}"
+    found = book.differences(book.read(path), cells.entries(name))
+    assert not found, "\n".join(
+        [f"{len(found)} cells differ", *found[:SHOWN], HINT.replace("ledger,", "ledger --cells,")]
+    )
 
 
 @pytest.mark.parametrize("pipeline", pipeline_names())

@@ -1,19 +1,26 @@
-"""``python -m tests.ledger [--cells]``: write the ledger of the frames; with ``--cells`` that of experiments too."""
+"""``python -m tests.ledger [--cells [EXPERIMENT ...]]``: write the ledger of the frames, or that of experiments' cells.
 
+``python -m tests.ledger && python -m tests.ledger --cells`` writes all of it (ten minutes).
+"""
+
+import os
 import sys
 
+from tests.conftest import SCENES_VARIABLE, real_scenes
 from tests.ledger import book, cells, frames
-from tilestamp.experiments.harness.registry import experiment_names
 from tilestamp.simulator.pipelines import pipeline_names
 
 
 def main() -> None:
-    """Write all files anew, and say what changed."""
-    for pipeline in pipeline_names():
-        _renew("frames", pipeline, ("frame", "kernel", "quantity", "value"), frames.entries(pipeline))
-    if "--cells" in sys.argv[1:]:
-        for name in experiment_names():
-            _renew("cells", name.replace("/", "-"), cells.HEADER, cells.entries(name))
+    """Write files anew, and say what changed."""
+    if "--cells" not in sys.argv[1:]:
+        for pipeline in pipeline_names():
+            _renew("frames", pipeline, ("frame", "kernel", "quantity", "value"), frames.entries(pipeline))
+        return
+    if real_scenes():
+        os.environ.setdefault(SCENES_VARIABLE, real_scenes())
+    for name in [name for name in sys.argv[1:] if name != "--cells"] or cells.experiments():
+        _renew("cells", cells.file_name(name), cells.HEADER, cells.entries(name))
 
 
 def _renew(folder: str, name: str, header: tuple[str, ...], entries: book.Entries) -> None:
@@ -21,6 +28,7 @@ def _renew(folder: str, name: str, header: tuple[str, ...], entries: book.Entrie
     changed = book.differences(book.read(path), entries) if path.exists() else []
     book.write(path, header, entries)
     sys.stdout.write(f"{folder}/{name}: {len(entries)} numbers, {len(changed)} changed\n")
+    sys.stdout.flush()
 
 
 main()

@@ -1,13 +1,27 @@
 """Cells of every experiment: what is published, what is ours, and what kind of number it is.
 
-The experiments run on the real scenes where these are at hand, which changes their numbers: such an experiment is
-compared only where they are.
+The experiments run on the real scenes, which change their numbers: they are compared only where those are at hand.
 """
 
 from tests.ledger.book import Entries
-from tilestamp.experiments.harness.registry import load_experiment
+from tilestamp.experiments.harness.registry import experiment_names, load_experiment
 
 HEADER = ("row", "column", "unit", "what", "value")
+MEASURED = {"frontier/model", "frontier/sampled"}  # their cells are CPU seconds, or hang on those of a calibration
+QUICK = {  # compared in the default suite; the others by ``pytest -m cells``
+    "eisenacher2010/claims", "eisenacher2010/table1", "eisenacher2010/table2", "eisenacher2010/table3",
+    "laine2011/memory", "laine2011/table3", "ru2016/tile_size", "zhang2025/graph",
+}  # fmt: skip
+
+
+def experiments() -> list[str]:
+    """Experiments whose cells are in the ledger."""
+    return [name for name in experiment_names() if name not in MEASURED]
+
+
+def file_name(name: str) -> str:
+    """Name of an experiment's file."""
+    return name.replace("/", "-")
 
 
 def entries(name: str) -> Entries:
