@@ -10,7 +10,10 @@ from tilestamp.simulator.pipelines import pipeline_names
 LEDGER = "tests/test_ledger.py"
 PLUMBING = ("kernel", "kernel_digest", "compile_cache", "used", "errors")  # of models: no rule of a machine
 SLOW = {"test_architecture", "test_frontier_methods", "test_silicon", "test_stability_overflow"}
-PIPELINE_TESTS = {"ru2016": ("tests/test_textured_mesh.py",), "zhang2025": ("tests/test_textured_mesh.py",)}
+PIPELINE_TESTS = {
+    "ru2016": ("tests/test_textured_mesh.py",),
+    "zhang2025": ("tests/test_counts_of_zhang.py", "tests/test_textured_mesh.py"),
+}
 STAGES = {  # folder of stages: pipelines that run them
     "eisenacher2010": ("micropolygon",),
     "laine2011": ("cudaraster",),
