@@ -6,7 +6,7 @@ import pytest
 from tests import naive_buckets
 from tests.test_bucketing import GT200, H200, bucketed, some_boxes
 from tests.test_counts_of_warps import nonzero
-from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketInitEvent, init_work
+from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketInitEvent, bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import BucketScanEvent, bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.split_counts import oracle_work, subdivide_work, transform_work
 from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
@@ -63,7 +63,7 @@ def test_bucket_write(tile, bound, simt):
 
 def test_init_clears_a_word_a_thread():
     """150 x 100 pixels in tiles of 4 have 38 x 25 = 950 counters: 256 a block, 182 in the last."""
-    work = init_work(screen_tiles(150, 100, 4, 4), 1, H200)
+    work = bucket_count(some_boxes(9, 4), screen_tiles(150, 100, 4, 4), H200).works[0]
     E = BucketInitEvent
     assert work.table[:, E.STORE_WARPS].tolist() == [8, 8, 8, 6]
     assert work.table[:, E.STORE_LANES].tolist() == [256, 256, 256, 182]
@@ -76,7 +76,7 @@ def test_scan_of_1500_counters_by_hand():
 
     A sweep over the tree of 256 vectors has 128, 64, 32, 16, 8, 4, 2, 1 lanes: 255, in 4 + 2 + 6 warps.
     """
-    _, (scan, sums, add) = bucket_scan(np.zeros(1500, np.uint32), H200)
+    _, (scan, sums, add), _ = bucket_scan(np.zeros(1500, np.uint32), H200)
     E = BucketScanEvent
     order = [E.WARPS, E.LANES, E.STEP_WARPS, E.STEP_LANES, E.BARRIER, E.LOAD_TRANSACTIONS, E.LOAD_BYTES]
     order += [E.STORE_TRANSACTIONS, E.STORE_BYTES]

@@ -38,7 +38,7 @@ def test_fine_raster(release, samples, mode, simt):
     )
     starts, entries, active = box_lists(setup, *size)
     options = {"release": release, "samples": samples, "mode": mode}
-    _, work = stage.fine_raster(setup, starts, entries, active, *size, simt, **options)
+    _, (work,), _ = stage.fine_raster(setup, starts, entries, active, *size, simt, **options)
     job = naive_fine.Job(setup, *size, simt, release == "nvdiffrast", samples, *stage.MODES[mode])
     expected = naive_fine.fine(job, starts, entries, active)
     assert expected["EARLY_Z_KILLS"] > 0 or release != "1.1" or not depth
@@ -52,8 +52,8 @@ def test_a_second_draw_loads_the_tiles_of_the_first():
     for samples, loads in ((1, 6 * 16), (2, 0)):
         setup, _, _ = triangle_setup(positions, triangles, *size, SECTORS, samples=samples, release="1.1", depth=False)
         lists = box_lists(setup, *size)
-        buffers, first = stage.fine_raster(setup, *lists, *size, SECTORS, samples=samples, **options)
-        _, second = stage.fine_raster(setup, *lists, *size, SECTORS, samples=samples, buffers=buffers, **options)
+        buffers, (first,), _ = stage.fine_raster(setup, *lists, *size, SECTORS, samples=samples, **options)
+        _, (second,), _ = stage.fine_raster(setup, *lists, *size, SECTORS, samples=samples, buffers=buffers, **options)
         E = first.events
         assert first.total(E.TILE_LOADS) == 0
         assert second.total(E.TILE_LOADS) == (6 if samples == 1 else 0)

@@ -34,7 +34,7 @@ def made(name, seed=4):
 @by_setup
 def test_bin_raster(name, simt):
     setup, width, height = made(name)
-    _, work, _ = bin_raster(setup, width, height, simt)
+    _, (work,), _ = bin_raster(setup, width, height, simt)
     assert nonzero(work.counts()) == nonzero(naive_queues.bin_counts(setup, width, height, simt))
 
 
@@ -43,7 +43,7 @@ def test_bin_raster(name, simt):
 def test_coarse_raster(name, simt):
     setup, width, height = made(name)
     queues, _, _ = bin_raster(setup, width, height, simt)
-    _, work, _ = coarse_raster(queues, setup, width, height, simt)
+    _, (work,), _ = coarse_raster(queues, setup, width, height, simt)
     entries = [part.tolist() for part in np.split(queues.entries, queues.starts[1:-1])]
     expected = naive_coarse.coarse_counts(setup, queues.batch_counts, entries, width, height, simt)
     counts = {event: n for event, n in work.counts().items() if not event.startswith("STORE")}

@@ -36,7 +36,7 @@ def test_per_primitive_raster(culling, textured, simt):
     screen, triangles = soup()
     every = np.arange(len(triangles), dtype=np.int32)
     options = {"culling": culling, "textured": textured}
-    _, _, work = per_primitive_raster(screen, triangles, every, WIDTH, HEIGHT, simt, **options)
+    _, (work,), _ = per_primitive_raster(screen, triangles, every, WIDTH, HEIGHT, simt, **options)
     expected = naive_ru.per_primitive(screen, triangles, WIDTH, HEIGHT, simt, **options)
     assert nonzero(work.counts()) == nonzero(expected)
 
@@ -61,7 +61,7 @@ def test_tiled_raster(tile, simt):
     screen, triangles = soup(60)
     every = np.arange(len(triangles), dtype=np.int32)
     lists, _, _ = tile_lists(screen, triangles, every, WIDTH, HEIGHT, simt, tile=tile, culling=True, capacity="safe")
-    _, work = tiled_raster(screen, triangles, lists, WIDTH, HEIGHT, simt, tile=tile)
+    _, (work,), _ = tiled_raster(screen, triangles, lists, WIDTH, HEIGHT, simt, tile=tile)
     entries = [[tuple(map(int, triangles[t])) for t in part] for part in np.split(lists.entries, lists.starts[1:-1])]
     counts = {event: n for event, n in work.counts().items() if not event.startswith("STORE")}
     assert nonzero(counts) == nonzero(naive_ru.tiled_raster(screen, entries, WIDTH, HEIGHT, tile, simt))
@@ -73,7 +73,7 @@ def test_a_tile_stores_fragments_word_by_word():
     lists, _, _ = tile_lists(
         screen, triangles, np.zeros(1, np.int32), 8, 8, HOPPER, tile=8, culling=True, capacity="safe"
     )
-    _, work = tiled_raster(screen, triangles, lists, 8, 8, HOPPER, tile=8)
+    _, (work,), _ = tiled_raster(screen, triangles, lists, 8, 8, HOPPER, tile=8)
     event = work.events
     assert work.total(event.STORE_TRANSACTIONS) == 2 * (11 * 32 + 32 + 4)  # of 32 lanes; depth in 4 rows of 32 bytes
     assert work.total(event.STORE_BYTES) == 32 * work.total(event.STORE_TRANSACTIONS)

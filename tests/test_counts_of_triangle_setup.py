@@ -28,7 +28,7 @@ def mixed():
 @pytest.mark.parametrize(("release", "samples"), [("1.1", 1), ("1.1", 4), ("nvdiffrast", 1)])
 def test_triangle_setup(release, samples, simt):
     positions, triangles = mixed()
-    _, work, _ = triangle_setup(positions, triangles, 20, 13, simt, release=release, samples=samples)
+    _, (work,), _ = triangle_setup(positions, triangles, 20, 13, simt, release=release, samples=samples)
     expected = setup_counts(positions, triangles, 20, 13, release, samples, simt)
     assert {"BETWEEN_CULLED", "RETEST_WARPS", "ATOMIC_CONFLICTS", "VIEWPORT_CULLED"} <= nonzero(expected).keys()
     assert nonzero(work.counts()) == nonzero(expected)
@@ -38,6 +38,6 @@ def test_triangle_setup(release, samples, simt):
 def test_what_a_mode_does_not_need_is_not_stored(depth, interpolate):
     positions, triangles = mesh_soup(1, 60, 0.8)
     options = {"depth": depth, "interpolate": interpolate}
-    _, work, _ = triangle_setup(positions, triangles, 20, 13, SECTORS, release="1.1", **options)
+    _, (work,), _ = triangle_setup(positions, triangles, 20, 13, SECTORS, release="1.1", **options)
     expected = setup_counts(positions, triangles, 20, 13, "1.1", 1, SECTORS, **options)
     assert nonzero(work.counts()) == nonzero(expected)

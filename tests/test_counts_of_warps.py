@@ -58,7 +58,7 @@ def test_freepipe_reads_each_pixel_that_it_hits_first():
 def test_across_polygons(packing, simt):
     polygons = twice(soup(40))
     samples = new_samples(WIDTH, HEIGHT, sample_positions(2))
-    work = across_polygons(polygons, samples, packing, simt)
+    (work,) = across_polygons(polygons, samples, packing, simt).works
     offsets = samples.offsets.tolist()
     expected = naive_warps.across_polygons(polygons.vertices.tolist(), WIDTH, HEIGHT, offsets, packing, simt)
     assert nonzero(work.counts()) == nonzero(expected)
@@ -70,7 +70,7 @@ def test_stamps(shape, simt):
     polygons = soup(24, corners=3, size=18.0, seed=8)
     samples = new_samples(WIDTH, HEIGHT, sample_positions(2))
     laid = stamp_shape(*shape)
-    work = stamps(polygons, samples, laid, simt)
+    (work,) = stamps(polygons, samples, laid, simt).works
     expected = naive_stamps.stamps(polygons.vertices.tolist(), WIDTH, HEIGHT, samples.offsets.tolist(), laid, simt)
     assert (expected["FILLED_WARPS"] > 0) == (shape[2] > 0)
     named = {name: count for name, count in expected.items() if name != "ATOMIC_CONFLICTS"}
@@ -84,7 +84,7 @@ def test_stamps(shape, simt):
 def test_bit_mask(kind, in_flight, simt):
     polygons = twice(soup(20, size=4.0))
     samples = new_samples(WIDTH, HEIGHT, sample_positions(4))
-    work = bit_mask(polygons, samples, kind, in_flight, simt)
+    (work,) = bit_mask(polygons, samples, kind, in_flight, simt).works
     given = (polygons.vertices.tolist(), polygons.patch.tolist(), WIDTH, HEIGHT, samples.offsets.tolist())
     assert nonzero(work.counts()) == nonzero(naive_stamps.bit_mask(*given, kind, in_flight, simt))
 
@@ -93,7 +93,7 @@ def test_a_mask_beyond_512_words_lies_in_global_memory():
     """Of 64 x 64 pixels with 16 samples: 2048 words."""
     polygons = soup(4, size=60.0)
     samples = new_samples(64, 64, sample_positions(16))
-    work = bit_mask(polygons, samples, "plain", 32, GT200)
+    (work,) = bit_mask(polygons, samples, "plain", 32, GT200).works
     given = (polygons.vertices.tolist(), polygons.patch.tolist(), 64, 64, samples.offsets.tolist())
     expected = naive_stamps.bit_mask(*given, "plain", 32, GT200)
     assert expected["GLOBAL_WRITE_WARPS"] > 0

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from tests.test_counts_of_warps import nonzero
-from tilestamp.models.simt import Simt
-from tilestamp.simulator.pipelines.binned import BinnedOptions, binned
+from tilestamp import simulate
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.scene import Scene
 
-SIMT = Simt()
 SIDE, NEAR, FAR = 48, 32, 8
 TILES, MET, INSIDE, PIXELS, QUADS = 36, 26, 3, 1176, 300
 COUNT = NEAR + FAR
@@ -35,8 +33,13 @@ def halves(textured=False):
 
 
 def works(textured=False, **options):
-    frame = binned(halves(textured), np.eye(4), SIDE, SIDE, SIMT, BinnedOptions(**options))
-    return {work.stage: work for work in frame.works}
+    return drawn(halves(textured), **options)
+
+
+def drawn(scene, **options):
+    """Works by stage."""
+    run = simulate(scene, "binned", "h200", width=SIDE, height=SIDE, camera=np.eye(4), **options)
+    return {work.stage: work for work in run.frame.works}
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +75,7 @@ def test_only_triangles_that_are_cut_into_pieces_take_further_slots():
     ]
     positions = np.concatenate([np.reshape(corners, (15, 2)), np.tile([0.0, 1.0], (15, 1))], axis=1)
     mesh = Mesh(positions.astype(np.float32), np.arange(15, dtype=np.int32).reshape(-1, 3))
-    frame = binned(Scene("five", mesh=mesh), np.eye(4), SIDE, SIDE, SIMT, BinnedOptions())
-    counts = next(work for work in frame.works if work.stage == "PrimitiveAssembly").counts()
+    counts = drawn(Scene("five", mesh=mesh))["PrimitiveAssembly"].counts()
     pieces = 1 + 1 + 1 + 2 + 1  # of the outside one, the mark in its slot
     assert {name: n for name, n in nonzero(counts).items() if "TRANS" not in name and "BYTES" not in name} == {
         "WARPS": 1, "WARP_LANES": 5, "CLIPPED": 1, "CULLED": 2, "PIECES": pieces, **atomics(1),
