@@ -153,12 +153,12 @@ def altered(
         key: plain_number(value) for key, value in values.items()
     }
     for key, value in values.items():
-        *path, last = key.split(".")
-        section = table
+        *path, last = str(key).split(".")
+        section: Any = table if path and path[0] in SECTIONS else {}
         for step in path:
-            section = section.get(step) or {}
-        if last not in section:
-            raise TilestampError(f"{key!r} is no number of a machine{_nearest(key, list(machine.provenance))}")
+            section = section.get(step) if isinstance(section, dict) else None
+        if not isinstance(section, dict) or isinstance(section.get(last, {}), dict):
+            raise TilestampError(f"{key!r} is no number of a machine{_nearest(str(key), list(machine.provenance))}")
         before = changes.pop(key, (section[last],))[0]
         section[last] = value
         if value != before:

@@ -1,7 +1,8 @@
 """Numbers of a machine as people give them: NumPy's, whole floats, those that no machine has, those of another warp."""
 
+import reprlib
 from collections.abc import Mapping
-from typing import Any, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 import msgspec.structs
@@ -10,31 +11,48 @@ import numpy as np
 
 def plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
     """Numbers of NumPy, and whole floats where an int belongs, as Python's own."""
-    kinds = get_type_hints(struct)
+    whole = {key for key, kind in get_type_hints(struct).items() if _is_whole(kind)}
     plain = {key: plain_number(value) for key, value in values.items()}
     return {
-        key: int(value) if kinds.get(key) is int and isinstance(value, float) and value.is_integer() else value
+        key: int(value) if key in whole and isinstance(value, float) and value.is_integer() else value
         for key, value in plain.items()
     }
 
 
+def _is_whole(kind: object) -> bool:
+    return kind is int or (get_origin(kind) is Literal and isinstance(get_args(kind)[0], int))
+
+
 def plain_number(value: object) -> Any:
-    """Make a number of NumPy one of Python; leave the rest."""
-    return value.item() if isinstance(value, np.generic) else value
+    """Make a number of NumPy one of Python, a lone one of an array too; leave the rest."""
+    return value.item() if isinstance(value, np.generic | np.ndarray) and value.shape == () else value
 
 
 def refusal(error: str, sections: dict[str, Any], structs: Mapping[str, type[msgspec.Struct]]) -> str:
     """Say which number no machine can have, and the range."""
     message, _, place = error.replace("`", "").partition(" - at $.")
     section, _, key = place.partition(".")
-    field = get_type_hints(structs[section], include_extras=True).get(key) if section in structs else None
-    value = sections.get(section, {}).get(key)
-    limits = getattr(field, "__metadata__", (None,))[0]
-    if not isinstance(limits, msgspec.Meta) or isinstance(value, str | bool):
+    values = sections.get(section, {})
+    kind = get_type_hints(structs[section], include_extras=True).get(key) if section in structs else None
+    if key == "per_clock[...]":  # a table of rates, all of one kind
+        kind, values = (
+            get_args(get_type_hints(structs[section], include_extras=True)["per_clock"])[1],
+            values["per_clock"],
+        )
+        key = next(key for key, rate in values.items() if not _is_within(rate, kind.__metadata__[0]))
+        place = f"{section}.per_clock.{key}"
+    limits = getattr(kind, "__metadata__", (None,))[0]
+    if not isinstance(limits, msgspec.Meta):
         return f"{message} - at {place}"
-    low, high = limits.ge if limits.gt is None else limits.gt, limits.le
-    kind = "a whole number" if get_type_hints(structs[section])[key] is int else "a number"
-    return f"{place} is {value}, and no machine has that: it is {kind} from {_read(low)} to {_read(high)}"
+    what = "a whole number" if get_args(kind)[0] is int else "a number"
+    low = f"from {_read(limits.ge)}" if limits.gt is None else f"above {_read(limits.gt)}"
+    value = reprlib.repr(values.get(key))
+    return f"{place} is {value}, and no machine has that: it is {what} {low} to {_read(limits.le)}"
+
+
+def _is_within(rate: Any, limits: msgspec.Meta) -> bool:
+    low, high = float(limits.ge or 0), float(limits.le or 0)
+    return isinstance(rate, int | float) and not isinstance(rate, bool) and low <= rate <= high
 
 
 def _read(limit: float | None) -> str:

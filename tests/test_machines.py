@@ -179,6 +179,11 @@ def test_a_what_if_of_an_unknown_number_is_refused():
         ("sm.clock_mhz", float("nan"), "sm.clock_mhz is nan"),
         ("issue.fp32", 0, "issue.fp32 is 0, .* from 0.015625 to 10,000"),
         ("sm.schedulers", 1.5, "sm.schedulers is 1.5, .* a whole number"),
+        ("sm.count", "many", "sm.count is 'many', .* a whole number from 1 to 65,536"),
+        ("sm.count", True, "sm.count is True"),
+        ("sm.clock_mhz", 10**400, r"sm.clock_mhz is 10+\.\.\.0+, and no machine has that"),
+        ("memory.dram_efficiency", 0, "memory.dram_efficiency is 0, .* a number above 0 to 1"),
+        ("fixed_function.per_clock.primitives", 0, "per_clock.primitives is 0, .* a number from 0.001 to 1,000,000"),
     ],
 )
 def test_a_number_that_no_machine_has_is_refused_with_its_range(key, value, said):
@@ -186,8 +191,18 @@ def test_a_number_that_no_machine_has_is_refused_with_its_range(key, value, said
         altered(load_machine("gtx280"), {key: value}, "assumed", "test")
 
 
+@pytest.mark.parametrize("key", ["sm", "sm.count.x", "", "digest", "provenance.sm", "fixed_function.per_clock", 3])
+def test_what_is_no_number_of_a_machine_cannot_be_altered(key):
+    with pytest.raises(TilestampError, match="is no number of a machine"):
+        altered(load_machine("gtx280"), {key: 3}, "assumed", "test")
+
+
+def test_a_choice_of_whole_numbers_takes_whole_floats():
+    assert altered(load_machine("gtx680"), {"memory.bank_mode_bytes": 4.0}, "assumed", "").memory.bank_mode_bytes == 4
+
+
 def test_numbers_of_numpy_and_whole_floats_are_numbers():
-    values = {"sm.count": np.int64(31), "sm.clock_mhz": np.float32(1300), "sm.max_warps": 32.0}
+    values = {"sm.count": np.array(31), "sm.clock_mhz": np.float32(1300), "sm.max_warps": 32.0}
     machine = altered(load_machine("gtx280"), values, "assumed", "test")
     assert (machine.sm.count, machine.sm.clock_mhz, machine.sm.max_warps) == (31, 1300.0, 32)
     assert (
