@@ -14,8 +14,8 @@ from tilestamp.models.kernel import kernel
 @kernel
 def list_schedule(
     sm: Any, alone: Any, draws: Any, places: int, sms: int, interval: float, start: float
-) -> tuple[float, float, int]:
-    """End of all units; the start and the index of the one that ends last.
+) -> tuple[float, float]:
+    """End of all units; the start of the one that ends last.
 
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before.
     """
@@ -23,7 +23,6 @@ def list_schedule(
     free, free_who = tournament(places if units > places else 1)
     served, served_who = tournament(min(sms, units))
     drawn = end = last_start = 0.0
-    last = 0
     for i in range(units):
         begun = i * interval
         if i >= places:
@@ -36,10 +35,10 @@ def list_schedule(
             begin = drawn
         done = max(done, begin + alone[i])
         if done > end:
-            end, last_start, last = done, begun, i
+            end, last_start = done, begun
         if units > places:
             replay(free, free_who, done)
-    return end, last_start, last
+    return end, last_start
 
 
 @kernel

@@ -24,7 +24,8 @@ One more SM or place only adds an entry to the lists. Two residents can be in ea
 the time is never above that of one resident an SM. Equal units take whole rounds (``ceil(units / places)``): that step
 is real, and it softens as units differ.
 
-The halves are expectations. ``low`` and ``high`` are the times at which nobody or everybody is in the way.
+The halves are expectations. ``low`` and ``high`` are the times at which nobody or everybody is in the way, where each
+unit waits for the mean share of its time: which one ends last may change, and they stay continuous.
 """
 
 from typing import NamedTuple
@@ -122,50 +123,51 @@ def played(asked: Asked, units: Loads) -> Timing:
     """Price what was asked."""
     terms = asked.terms
     least = longest(terms, asked.units)
-    end, started, waited = ends(units)
-    whole, in_step = together(units, units.begun + end)
-    cycles = max(whole, least)
+    low, end, high, started = ends(units)
+    sooner, expected, later = (
+        together(units, units.begun + e, s) for e, s in ((low, 0.0), (end, IN_THE_WAY), (high, 1.0))
+    )
+    cycles = max(expected, least)
     tail = max(0.0, cycles - units.begun - started)
     return timing(
         asked,
         terms["launch"] + cycles,
         _holds(terms, cycles, tail, units.sms < asked.machine.sm.count),
         "schedule",
-        (terms["launch"] + max(least, cycles - waited - in_step), terms["launch"] + cycles + waited + in_step),
+        (terms["launch"] + max(least, sooner), terms["launch"] + max(least, later)),
         busy_sms=float(min(len(units.alone), units.sms)),
         tail_cycles=tail,
     )
 
 
-def together(units: Loads, end: float) -> tuple[float, float]:
-    """Cycles of the SMs' schedule, memory and atomic units side by side; how many of them the others are in the way."""
+def together(units: Loads, end: float, share: float) -> float:
+    """Cycles of the SMs, memory and atomic units side by side, for a share of the smaller in each other's way."""
     if not end:
-        return 0.0, 0.0
+        return 0.0
     own, served = float(units.alone.mean()), float(units.sm.sum()) / units.sms
     sides = (
         (end, 0.0, units.memory + units.atomic),
         (units.memory, units.way, units.atomic + served),
         (units.atomic, units.way, units.memory + served),
     )
-    waits = [IN_THE_WAY * min(time, others, own) for time, _, others in sides]
-    return max((time + trip + wait, wait) for (time, trip, _), wait in zip(sides, waits, strict=True))
+    return max(time + trip + share * min(time, others, own) for time, trip, others in sides)
 
 
-def ends(units: Loads) -> tuple[float, float, float]:
-    """Cycles to the end of the last unit and to its start; how many of them it and those before it wait for others."""
+def ends(units: Loads) -> tuple[float, float, float, float]:
+    """Cycles to the end of the last unit: at least, expected, at most; and to its start."""
     extra = crowd(units)
-    crowded = _ends(units, units.alone + extra, units.places)
-    last = crowded[2]
-    waited = float(extra[last] + extra[:last].sum() / units.places) if len(extra) else 0.0
-    if waited and units.alone.sum() / units.sms < crowded[0]:
-        lonely = _ends(units, units.alone, units.sms)
-        if lonely[0] < crowded[0]:
-            return lonely[0], lonely[1], 0.0
-    return crowded[0], crowded[1], waited
+    own, more = float(units.alone.sum()), float(extra.sum())
+    end, started = _ends(units, units.alone + extra, units.places)
+    waited = end * more / (own + more) if more else 0.0
+    if more and own / units.sms < end + waited:
+        lonely, lonely_started = _ends(units, units.alone, units.sms)
+        started = lonely_started if lonely < end else started
+        return min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started
+    return end - waited, end, end + waited, started
 
 
-def _ends(units: Loads, alone: NDArray[np.float64], places: int) -> tuple[float, float, int]:
-    result: tuple[float, float, int] = list_schedule(
+def _ends(units: Loads, alone: NDArray[np.float64], places: int) -> tuple[float, float]:
+    result: tuple[float, float] = list_schedule(
         units.sm, alone, units.draws, places, units.sms, units.interval, units.start
     )
     return result

@@ -152,6 +152,33 @@ def test_a_time_is_not_below_its_bounds_and_within_its_spread(launch, machine):
 
 
 @settings(deadline=None, max_examples=60)
+@given(launch=launches(), machine=st.sampled_from(MACHINES), seed=st.integers(0, 10**6))
+def test_events_that_change_a_little_change_the_spread_by_no_more(launch, machine, seed):
+    """Another unit may be the last one to end: what it waits for does not jump into the spread."""
+    noise = 1 + 1e-4 * np.random.default_rng(seed).uniform(-1, 1, launch.events.shape)
+    other = replace(launch, events=launch.events * noise)
+    try:
+        before, after = (schedule(what, machine, traffic([what], machine)[0]) for what in (launch, other))
+    except TilestampError:
+        return
+    assert after.low / before.low == pytest.approx(1.0, rel=5e-4)
+    assert after.high / before.high == pytest.approx(1.0, rel=5e-4)
+
+
+def test_the_spread_stays_where_another_unit_ends_last():
+    """The first block waits for nothing and ends with the others, 0.01 % before or after them."""
+    work, chains = np.full(264, 4.0e4), np.zeros(264)
+    work[0], spreads = 0.0, []
+    end = schedule(launch_of(264, 32, LOAD=work), AT_ONCE, NOTHING).cycles - OVERHEAD
+    for ratio in (0.9999, 1.0001):
+        chains[0] = (ratio * end - START) / DRAM
+        got = schedule(launch_of(264, 32, LOAD=work, CHAIN_LOAD=chains), AT_ONCE, NOTHING)
+        spreads.append((got.low, got.high))
+    assert spreads[0] == pytest.approx(spreads[1], rel=1e-3)
+    assert got.low < 0.95 * got.milliseconds < 0.95 / 1.05 * got.high
+
+
+@settings(deadline=None, max_examples=60)
 @given(
     seed=st.integers(0, 10**6),
     units=st.integers(0, 60),
