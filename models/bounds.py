@@ -131,5 +131,13 @@ def timing(
         fidelity=fidelity,
         low=low,
         high=high,
-        residency=f"{asked.held.blocks} an SM by {asked.held.limit}",
+        residency=_steps(asked),
     )
+
+
+def _steps(asked: Asked) -> str:
+    """Say where a time may step: blocks that an SM holds, and the rounds in which all SMs take the grid."""
+    held = f"{asked.held.blocks} an SM by {asked.held.limit}"
+    if asked.launch.dispatch != "blocks":
+        return held
+    return f"{held}, {asked.launch.grid / (asked.held.blocks * asked.machine.sm.count):.2f} rounds"

@@ -28,7 +28,8 @@ class Timing:
         Milliseconds between which units that are in each other's way less or more often than expected put the launch
         (see ``models.schedule``); the same number where nothing spreads. It is no error of the model.
     residency : str
-        Blocks that an SM holds, and what keeps out one more: where that number changes, a time may step.
+        Blocks that an SM holds, what keeps out one more, and the rounds in which such SMs take the grid's blocks: where
+        the number of blocks, or the rounds rounded up, changes, a time may step.
     why : str
         Why ``auto`` chose it.
     error_bound : float

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tilestamp.models.bounds import bounds
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.list_schedule import list_schedule
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.schedule import schedule
@@ -328,3 +328,44 @@ def test_a_launch_of_one_round_is_in_step_with_itself():
     for share in (0.1, 0.3):
         got = schedule(what, AT_ONCE, Traffic(share * alone * AT_ONCE.dram_bytes_per_cycle, 0.0, 1.0))
         assert got.cycles == pytest.approx(OVERHEAD + alone * (1 + share / 2), rel=1e-4)
+
+
+@pytest.mark.parametrize(("blocks", "said"), [(2112, ", 1.00 rounds"), (3168, ", 1.50 rounds")])
+def test_where_a_time_may_step_is_said(blocks, said):
+    assert schedule(launch_of(blocks, 128), H200, NOTHING).residency == f"16 an SM by warps{said}"
+
+
+streams = st.lists(
+    st.tuples(st.sampled_from("abcd"), st.sampled_from(["load", "store", "atomic"]), st.integers(1, 10**5)),
+    min_size=1,
+    max_size=8,
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(frame=streams, share=st.floats(0.01, 1.0), cache=st.integers(1, 10**5), more=st.integers(1, 10**5))
+def test_a_larger_cache_moves_no_more_bytes_in_all(frame, share, cache, more):
+    """Of a frame; which launch pays for what is written back may change."""
+    events = np.zeros((1, EVENTS))
+    frame = [
+        replace(launch_of(1), events=events, streams=(Stream(name, op, size, int(share * size)),))
+        for name, op, size in frame
+    ]
+    caches = (altered(H200, {"memory.l2_bytes": size}, "assumed", "a test") for size in (cache, cache + more))
+    less, much = (sum(moved.dram_bytes for moved in traffic(frame, machine)) for machine in caches)
+    assert much <= less * ROUNDING + 1e-6
+
+
+@settings(deadline=None, max_examples=60)
+@given(launch=launches(), sizes=st.tuples(st.integers(1, 10**7), st.integers(1, 10**9)), more=st.integers(1, 132))
+def test_more_sms_that_share_an_l2_cost_no_more_than_their_share(launch, sizes, more):
+    """Each fetches from L2 what it keeps in its L1: the bytes grow by no more than the SMs, and so does the time."""
+    what = replace(launch, streams=(Stream("table", "load", sizes[0], sizes[0], asked_bytes=sizes[1]),))
+    larger = altered(H200, {"sm.count": H200.sm.count + more}, "assumed", "a test")
+    try:
+        before = microseconds(what, H200)
+    except TilestampError:
+        return
+    bytes_ = [traffic([what], machine)[0].l2_bytes for machine in (H200, larger)]
+    assert bytes_[1] <= bytes_[0] * larger.sm.count / H200.sm.count + 1
+    assert microseconds(what, larger) <= before * max(1.0, bytes_[1] / bytes_[0]) * ROUNDING
