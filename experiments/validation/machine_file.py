@@ -6,8 +6,6 @@ from tilestamp.experiments.validation.gpu import BUSY
 from tilestamp.experiments.validation.measuring import Number
 from tilestamp.models.machine import SECTIONS, Machine
 
-WHOLE = ("count", "warp_size", "max_", "registers", "_bytes", "banks", "units", "unit_bytes")
-
 
 def machine_file(numbers: Iterable[Number], base: Machine, name: str, description: str, capability: str) -> str:
     """TOML text.
