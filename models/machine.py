@@ -19,6 +19,7 @@ import msgspec.structs
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
+from tilestamp.models.paths import is_file
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.models.used import note
 
@@ -113,16 +114,16 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
     path = Path(name_or_path)
     if path.suffix != ".toml":
         path = FOLDER / f"{name_or_path}.toml"
-        if not path.is_file():
-            known = list(list_machines())
-            raise TilestampError(
-                f"no machine {str(name_or_path)!r}{_nearest(str(name_or_path), known)}; known: {', '.join(known)}"
-            )
+        if not is_file(path):
+            known, word = list(list_machines()), str(name_or_path)
+            raise TilestampError(f"no machine {word!r}{_nearest(word.lower(), known)}; known: {', '.join(known)}")
+    if not is_file(path):
+        raise TilestampError(f"there is no machine file {path}")
     try:
-        table = tomllib.loads(path.read_text("utf-8"))
+        table = tomllib.loads(path.read_text("utf-8-sig"))
     except OSError as error:
         raise TilestampError(f"cannot read the machine file {path}: {error.strerror}") from error
-    except ValueError as error:  # no TOML, no text or no path
+    except (ValueError, RecursionError) as error:  # no TOML or no text
         raise TilestampError(f"{path} is not a TOML file: {error}") from error
     machine = _build(table, str(path))
     shipped = FOLDER / f"{machine.name}.toml"

@@ -80,8 +80,10 @@ def simulate(
     TilestampError
         Bad input, in one sentence.
     """
-    drawing = Drawing(width=width, height=height, fidelity=fidelity, error=error, seed=seed, picture=picture)
-    width, height, error = drawing.width, drawing.height, drawing.error
+    drawing = Drawing(
+        width=width, height=height, fidelity=fidelity, error=error, seed=seed, counting=counting, picture=picture
+    )
+    width, height, error, counting = drawing.width, drawing.height, drawing.error, drawing.counting
     chosen = pipeline_options(pipeline, options)
     scene, machine = load_scene(scene), load_machine(machine)
     if drawing.fidelity != "counts" and counting:
@@ -115,6 +117,8 @@ class Drawing(Options, frozen=True, kw_only=True):
     """Share of the value that will do."""
     seed: Annotated[int, Meta(ge=0)]
     """Of the random part."""
+    counting: bool
+    """Whether to count."""
     picture: bool
     """Whether one is wanted."""
 

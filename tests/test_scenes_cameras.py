@@ -125,7 +125,7 @@ def test_the_published_cameras_are_read(shared):
         ({"eye": [0, 0, 1]}, "it has eye"),
         (42, "42 is not a camera"),
         ("nowhere", "no such view"),
-        ("missing.json", "missing.json: the camera file cannot be read"),
+        ("missing.json", "missing.json: there is no such file"),
     ],
 )
 def test_what_is_wrong_with_a_camera_is_a_sentence(source, sentence):

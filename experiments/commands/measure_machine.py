@@ -6,9 +6,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.commands.terminal import print_table, progress, writing
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.models.paths import is_folder
 
 
 def measure_machine(
@@ -27,7 +28,7 @@ def measure_machine(
     """
     if output.suffix != ".toml":
         raise TilestampError(f"a machine file ends in .toml, not {output.name}")
-    if not output.absolute().parent.is_dir():
+    if not is_folder(output.absolute().parent):
         raise TilestampError(f"there is no folder {output.absolute().parent} to write {output.name} to")
     from tilestamp.experiments.validation.gpu import cupy
     from tilestamp.experiments.validation.machine_file import busy, machine_file
@@ -43,7 +44,8 @@ def measure_machine(
             say(f"{number.key} = {number.value:.5g}")
             numbers.append(number)
     text = machine_file(numbers, load_machine(base), output.stem, f"{gpu}, measured", capability)
-    output.write_text(text, "utf-8")
+    with writing(output):
+        output.write_text(text, "utf-8")
     load_machine(output)
     rows = [[n.key, f"{n.value:.5g}", f"{100 * n.spread:.1f} %", n.how] for n in numbers]
     print_table(f"{gpu}: {output}", ["number", "value", "spread", "how"], rows)

@@ -13,6 +13,7 @@ from tilestamp.experiments.commands.option_flags import given_options, literal, 
 from tilestamp.experiments.commands.render_output import as_json, print_run, write_map, write_png
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_folder
 from tilestamp.simulator.pipelines import options_type
 from tilestamp.simulator.run import Run
 
@@ -130,9 +131,9 @@ def _check_output(output: Path | None, map_: str | None) -> None:
         return
     if output.suffix.lower() != ".png":
         raise TilestampError(f"-o {output}: pictures are written as .png")
-    if not output.parent.is_dir():
+    if not is_folder(output.parent):
         raise TilestampError(f"-o {output}: there is no folder {output.parent}")
-    if output.is_dir():
+    if is_folder(output):
         raise TilestampError(f"-o {output}: is a folder")
     if not os.access(output.parent, os.W_OK):
         raise TilestampError(f"-o {output}: the folder {output.parent} cannot be written to")

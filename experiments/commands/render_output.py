@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.commands.terminal import print_table
+from tilestamp.experiments.commands.terminal import print_table, writing
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 
@@ -29,13 +29,12 @@ def write_png(image: NDArray[np.uint8], path: Path) -> None:
     from PIL import Image
 
     partial = path.with_suffix(".partial")
-    try:
-        Image.fromarray(image).save(partial, format="png")
-        partial.replace(path)
-    except OSError as error:
-        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    with writing(path):
+        try:
+            Image.fromarray(image).save(partial, format="png")
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 def write_map(run: Run, name: str, path: Path) -> None:
@@ -50,7 +49,8 @@ def write_map(run: Run, name: str, path: Path) -> None:
     unit = f"{name} a {'pixel' if by_pixel else 'tile'}"
     tile, from_below = (1, False) if by_pixel else (run.frame.tile, run.frame.tiles_from_below)
     size = run.width, run.height
-    heat_map(counts, path, title=title, unit=unit, size=size, tile=tile, from_below=from_below)
+    with writing(path):
+        heat_map(counts, path, title=title, unit=unit, size=size, tile=tile, from_below=from_below)
 
 
 def as_json(run: Run) -> dict[str, Any]:

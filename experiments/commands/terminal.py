@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.console import Console
 from rich.status import Status
@@ -9,6 +10,16 @@ from rich.table import Table
 from rich.text import Text
 
 from tilestamp.models.compile_cache import on_compiling
+from tilestamp.models.errors import TilestampError
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Say in a sentence why a file cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
 
 
 @contextmanager

@@ -6,10 +6,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.commands.terminal import print_table, progress, writing
 from tilestamp.experiments.validation.summary import by_kernel, fastest_tiles
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
+from tilestamp.models.paths import is_folder
 
 
 def validate(
@@ -31,19 +32,22 @@ def validate(
         CSV file for every compared number.
     """
     model = load_machine(machine)
+    if output is not None and not is_folder(output.absolute().parent):
+        raise TilestampError(f"-o {output}: there is no folder {output.absolute().parent}")
     with progress("validating") as say:
         if measurements is None:
             from tilestamp.experiments.validation.on_gpu import compare_here
 
             table, remarks = compare_here(model, say)
         else:
-            if not measurements.is_dir():
+            if not is_folder(measurements):
                 raise TilestampError(f"{measurements} is not a folder of measurements")
             from tilestamp.experiments.validation.stored import compare
 
             table, remarks = compare(measurements, model, say), []
     if output is not None:
-        table.to_csv(output, index=False)
+        with writing(output):
+            table.to_csv(output, index=False)
     rows = [
         [r.kernel, str(r.spp or ""), r.quantity, str(r.cells), f"{r['mean']:.3f}", f"{r.worst:.3f}"]
         for _, r in by_kernel(table).iterrows()

@@ -5,12 +5,13 @@ from functools import cache
 from tilestamp.models.price import Fidelity
 from tilestamp.models.used import remembered
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.scenes.library import scene_or_stand_in
+from tilestamp.simulator.scenes.library import is_stand_in, scene_or_stand_in
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.simulation import simulate
 
 SOURCE = "Eisenacher & Loop, Data-parallel Micropolygon Rasterization, Eurographics 2010 short papers"
 MACHINE = "gtx280"
+STAND_IN = "STAND-IN, not the paper's model"
 OVERHEAD_MS = 4.6  # published: table 3, system overhead at 1600x1200
 OVERHEAD_PIXELS = 1600 * 1200  # assumed: the overhead is a copy of the picture, so it goes with the pixels
 
@@ -62,8 +63,9 @@ def overhead_ms(run: Run) -> float:
 
 
 def stand_in_warnings(*names: str) -> list[str]:
-    """What is to be said where models are missing."""
-    return [f"STAND-IN, not the paper's model: {model(name).note}" for name in names if model(name).note]
+    """What is to be said where models are missing, or their files were not read whole."""
+    models = map(model, names)
+    return [f"{STAND_IN if is_stand_in(one) else one.name}: {one.note}" for one in models if one.note]
 
 
 def stage_ms(run: Run, *stages: str) -> float:

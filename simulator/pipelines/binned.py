@@ -10,6 +10,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
+from tilestamp.simulator.scenes.clip_space import model_to_clip
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import MAX_LEVELS, TILE, texture_chains
 from tilestamp.simulator.scenes.textured_mesh import geometry
@@ -74,6 +75,7 @@ def binned(
     """
     optimized = options.optimized
     mesh = geometry(scene)
+    matrix = model_to_clip(scene.mesh, matrix)
     textures = scene.mesh.textures if scene.mesh else ()
     stored = options.texture_tile if options.texture_layout == "tiled" else 0
     chains = texture_chains(

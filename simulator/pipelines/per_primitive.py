@@ -10,6 +10,7 @@ from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.pipelines.tiled import not_drawn
+from tilestamp.simulator.scenes.clip_space import model_to_clip
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import texture_chains
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
@@ -55,6 +56,7 @@ def per_primitive(
         See ``tilestamp.simulator.pipelines``.
     """
     mesh = geometry(scene)
+    matrix = model_to_clip(scene.mesh, matrix)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     parts = draws(scene, mesh)
     vertices, drawable = execute(

@@ -10,6 +10,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
+from tilestamp.simulator.scenes.clip_space import model_to_clip
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import texture_chains
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
@@ -57,6 +58,7 @@ def tiled(
     """
     tile = options.tile
     mesh = geometry(scene)
+    matrix = model_to_clip(scene.mesh, matrix)
     chains = texture_chains(scene.mesh.textures if scene.mesh else (), mips=False)
     tiles = -(-width // tile) * -(-height // tile)
     parts = draws(scene, mesh)

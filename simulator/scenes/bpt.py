@@ -50,8 +50,8 @@ def read_bpt(path: str | Path) -> Patches:
     corners = lines.table(patches, (POINTS_PER_PATCH,), np.int64, "point numbers")
     first_corner_line = lines.next_line - patches
     points = lines.count("points")
-    first_point_line = lines.next_line + 1
     values = lines.table(points, (3, 4), np.float64, "coordinates")
+    first_point_line = lines.next_line - points + 1
     lines.end()
     wrong = ((corners < 1) | (corners > points)).any(axis=1)
     if wrong.any():
@@ -69,8 +69,8 @@ def _headed(lines: "_Lines", patches: int) -> Patches:
             raise lines.error(lines.next_line, f"the degrees (1 to 3) of patch {patch + 1} of {patches} should be here")
         lines.next_line += 1
         rows, columns = (degree + 1 for degree in degrees)
-        first_line = lines.next_line + 1
         values = lines.table(rows * columns, (3, 4), np.float64, "coordinates")
+        first_line = lines.next_line - rows * columns + 1
         points = _homogeneous(values, lines.path, first_line).reshape(rows, columns, 4)
         nets.append(np.einsum("ar,bc,rck->abk", RAISED[rows], RAISED[columns], points).reshape(16, 4))
     lines.end()
@@ -113,9 +113,15 @@ class _Lines:
         """Say what is wrong with the line of a 0-based index."""
         return TilestampError(f"{self.path}:{index + 1}: {what}")
 
+    def _skip_blanks(self) -> int:
+        """Go on to a line that is not blank, and give its index."""
+        while self.next_line < len(self.lines) - 1 and not self.lines[self.next_line].strip():
+            self.next_line += 1
+        return self.next_line
+
     def count(self, what: str) -> int:
         """Take one line that holds a positive number."""
-        index = self.next_line
+        index = self._skip_blanks()
         if index >= len(self.lines):
             raise self.error(index, f"the file ends where the number of {what} should be")
         text = self.lines[index].strip()
@@ -126,7 +132,7 @@ class _Lines:
 
     def degrees(self) -> tuple[int, int] | None:
         """Look at a line of two degrees, from 1 to 3; None where it is none."""
-        words = self.lines[self.next_line].split(",") if self.next_line < len(self.lines) else []
+        words = self.lines[self._skip_blanks()].split(",") if self.next_line < len(self.lines) else []
         return (
             (int(words[0]), int(words[1]))
             if len(words) == 2 and all(word in ("1", "2", "3") for word in words)
@@ -135,7 +141,8 @@ class _Lines:
 
     def table(self, rows: int, widths: tuple[int, ...], dtype: type, what: str) -> NDArray[np.float64]:
         """Take ``rows`` lines of comma-separated numbers, all of one of the ``widths``."""
-        start, stop = self.next_line, self.next_line + rows
+        start = self._skip_blanks()
+        stop = start + rows
         if stop > len(self.lines):
             raise self.error(
                 len(self.lines), f"the file ends after {len(self.lines) - start} of {rows} lines of {what}"

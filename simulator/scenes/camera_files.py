@@ -12,6 +12,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.camera import Camera, LookAt, ModelToClip
 from tilestamp.simulator.scenes.library import with_views
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 
 MATRIX_KEY = "model_to_clip"
 CameraSource = Camera | ArrayLike | Mapping[str, Any] | Path | None
@@ -70,13 +71,12 @@ def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:
 
 
 def _load_json(path: Path) -> Any:
+    text = plain_text(read_bytes(path))
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TilestampError(f"{path}: the camera file cannot be read ({error.strerror})") from None
+        return json.loads(text)
     except json.JSONDecodeError as error:
         raise TilestampError(f"{path}:{error.lineno}: not JSON ({error.msg})") from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise TilestampError(f"{path}: the camera file is not text") from None
 
 

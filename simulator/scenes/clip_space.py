@@ -47,6 +47,11 @@ def clip_space_mesh(positions: ArrayLike, triangles: ArrayLike, source: str | Pa
     return Mesh(finite_positions(array, source), vertex_numbers(triangles, len(array), source), clip_space=True)
 
 
+def model_to_clip(mesh: Mesh | None, matrix: NDArray[Any]) -> NDArray[Any]:
+    """Give the matrix to draw a mesh with: the camera's, or none (the identity) where it is in clip space."""
+    return np.eye(4) if mesh is not None and mesh.clip_space else matrix
+
+
 def checked_mesh(mesh: Mesh, source: str | Path) -> Mesh:
     """Give a mesh back, once its positions are known to be finite and its triangles to exist."""
     finite_positions(mesh.positions, source)

@@ -5,7 +5,6 @@ Compressed buffers (Draco, meshopt) are refused by name.
 """
 
 import base64
-import binascii
 import json
 import struct
 from pathlib import Path
@@ -16,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_file
 from tilestamp.simulator.scenes.images import read_image
 from tilestamp.simulator.scenes.notes import Notes
-from tilestamp.simulator.scenes.text_scan import plain_text
+from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 # Extensions that a file may need: what they change is read, or changes no triangle (then a note names them).
 READ = ("KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp")
+LOOKS = ("KHR_materials_", "KHR_lights_")
 MOST_ZEROS = 2**22  # values of an accessor without data
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -46,20 +47,21 @@ class GltfFile:
         self.path, self.notes = path, notes
         try:
             self.tree, self._binary = _split(path)
-        except OSError as error:
-            raise TilestampError(f"{path.name}: cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError, struct.error) as error:
             raise TilestampError(f"{path.name}: broken glTF: {error}") from None
         if not str(self.tree.get("asset", {}).get("version", "")).startswith("2"):
             raise TilestampError(f"{path.name}: only glTF 2.0 is read, this says version {self.tree.get('asset')}")
         for extension in self.tree.get("extensionsRequired", []):
-            if extension not in READ:
+            if extension not in READ and not extension.startswith(LOOKS):
                 raise TilestampError(f"{path.name}: needs the glTF extension {extension}, which is not read")
         self._buffers: dict[int, bytes] = {}
 
-    def accessor(self, index: int) -> NDArray[Any]:
-        """Values of one accessor, (count, width); normalized integers as floats."""
+    def accessor(self, index: int, *kinds: str) -> NDArray[Any]:
+        """Values of one accessor of one of some kinds ("VEC3"), (count, width); normalized integers as floats."""
         accessor = self._entry("accessors", index)
+        if accessor.get("type") not in kinds:
+            what = f"accessor {index} is {accessor.get('type')} where {' or '.join(kinds)} should be"
+            raise TilestampError(f"{self.path.name}: broken glTF: {what}")
         try:
             kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[accessor["type"]]
             count = int(accessor["count"])
@@ -157,15 +159,14 @@ class GltfFile:
                 header, data = uri.split(",", 1)
                 return base64.b64decode(data, validate=True) if header.endswith(";base64") else unquote_to_bytes(data)
             names = (uri, unquote(uri), unquote(uri).replace("\\", "/"))
-            file = next((self.path.parent / name for name in names if (self.path.parent / name).is_file()), None)
-            return (file or self.path.parent / uri).read_bytes()
-        except (OSError, ValueError, binascii.Error):
+            return read_bytes(next(filter(is_file, (self.path.parent / name for name in names)), self.path / uri))
+        except (TilestampError, ValueError):
             raise TilestampError(f"{self.path.name}: cannot read {uri[:60] or 'an image without data'}") from None
 
 
 def _split(path: Path) -> tuple[dict[str, Any], bytes]:
     """Take a file apart into its JSON tree and the binary chunk of a .glb."""
-    data = path.read_bytes()
+    data = read_bytes(path)
     if len(data) < 12 or struct.unpack_from("<I", data)[0] != MAGIC:
         return _tree(data), b""
     chunks: dict[int, bytes] = {}

@@ -88,7 +88,11 @@ def _note_rest(file: GltfFile) -> None:
     """Name what a file has beside its triangles."""
     tables = ("animations", "cameras", "skins")
     unread = [f"{table} ({len(file.tree[table])})" for table in tables if file.tree.get(table)]
-    unread += [name for name in file.tree.get("extensionsUsed", []) if name not in READ]
+    unread += [
+        name
+        for name in {**dict.fromkeys(file.tree.get("extensionsUsed", []) + file.tree.get("extensionsRequired", []))}
+        if name not in READ
+    ]
     file.notes.add_if(unread, f"parts of the file that are not read: {', '.join(map(str, unread))}")
 
 
@@ -99,7 +103,7 @@ def _part(file: GltfFile, primitive: dict[str, Any], matrix: NDArray[np.float64]
         raise TilestampError(f"{file.path.name}: is compressed with Draco, which is not read")
     if "POSITION" not in attributes:
         raise TilestampError(f"{file.path.name}: broken glTF: a primitive has no positions")
-    local = file.accessor(attributes["POSITION"]).astype(np.float64)
+    local = file.accessor(attributes["POSITION"], "VEC3").astype(np.float64)
     count = len(local)
     triangles = _triangles(file, primitive, count)
     if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror turns the winding
@@ -109,7 +113,7 @@ def _part(file: GltfFile, primitive: dict[str, Any], matrix: NDArray[np.float64]
     color, texture, info = _material(file, primitive, images)
     colors = np.tile(color, (count, 1))
     if "COLOR_0" in attributes:
-        shade = file.accessor(attributes["COLOR_0"])
+        shade = file.accessor(attributes["COLOR_0"], "VEC3", "VEC4")
         colors[:, : shade.shape[1]] *= shade
     file.notes.add_if(primitive.get("targets"), "morph targets are not applied")
     return {
@@ -124,7 +128,7 @@ def _part(file: GltfFile, primitive: dict[str, Any], matrix: NDArray[np.float64]
 
 def _triangles(file: GltfFile, primitive: dict[str, Any], count: int) -> NDArray[np.int32]:
     """Vertex indices, (F, 3); a last incomplete triangle is dropped, as glTF says."""
-    indices = file.accessor(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
+    indices = file.accessor(primitive["indices"], "SCALAR")[:, 0] if "indices" in primitive else np.arange(count)
     if len(indices) and not 0 <= indices.min() <= indices.max() < count:
         raise TilestampError(f"{file.path.name}: broken glTF: an index {indices.max()} in a mesh of {count} vertices")
     mode = primitive.get("mode", TRIANGLES)
@@ -173,7 +177,7 @@ def _coordinates(file: GltfFile, attributes: dict[str, Any], info: dict[str, Any
         info and name not in attributes, f"a mesh without {name}, which its texture needs, shows its colour"
     )
     if name in attributes:
-        uvs[:] = file.accessor(attributes[name])
+        uvs[:] = file.accessor(attributes[name], "VEC2")
     if change:
         angle, scale = change.get("rotation", 0.0), np.asarray(change.get("scale", (1.0, 1.0)), np.float64)
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -191,7 +195,7 @@ def _normals(
     """Give the normals of a part in the scene's space."""
     if "NORMAL" not in attributes:
         return vertex_normals(positions, triangles)
-    normals = file.accessor(attributes["NORMAL"]).astype(np.float64) @ np.linalg.pinv(matrix[:3, :3])
+    normals = file.accessor(attributes["NORMAL"], "VEC3").astype(np.float64) @ np.linalg.pinv(matrix[:3, :3])
     if len(normals) != len(positions):
         raise TilestampError(f"{file.path.name}: broken glTF: {len(normals)} normals for {len(positions)} vertices")
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_file
 from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
@@ -45,6 +46,7 @@ NOT_SHIPPED = {
 }
 LARGE_BYTES, LARGE_TIMES = 2**25, 10  # memory above both (bytes; times the file) is worth a note
 CAGE_BYTES = 1400  # a patch, while a cage becomes patches; measured
+STAND_IN = "stand-in for "  # first words of its name
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
 STAND_IN_SIZE = 0.9  # diagonal of its box over the model's: the cow is stouter, and must lie inside the same views
 
@@ -76,8 +78,9 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
         return source
     if not isinstance(source, str | Path):
         raise TilestampError(f"a scene is a Scene, a name or a file, not {source!r}")
+    source = str(source)
     path = _resolve(source, scene_path)
-    name = str(source) if source in EMBEDDED else path.stem
+    name = source if source in EMBEDDED else path.stem
     try:
         return with_views(_read(name, path, kind))
     except TilestampError:
@@ -119,7 +122,13 @@ def stand_in(name: str) -> Scene:
         f"stand-in: {model.patches} patches cut from the embedded spot, because {name} ({model.line}) is not here;"
         f" put {name}.bpt on the scene search path (TILESTAMP_SCENES)"
     )
-    return with_views(Scene(name, patches=Patches(points.astype(np.float32)), note=note))
+    scene = with_views(Scene(name, patches=Patches(points.astype(np.float32)), note=note))
+    return replace(scene, name=STAND_IN + name)
+
+
+def is_stand_in(scene: Scene) -> bool:
+    """Whether a scene only stands for a model that is not here."""
+    return scene.name.startswith(STAND_IN)
 
 
 def scene_or_stand_in(name: str, scene_path: SearchPath = None) -> Scene:
@@ -152,18 +161,18 @@ def bounds(scene: Scene) -> NDArray[np.float64]:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _resolve(source: str | Path, scene_path: SearchPath) -> Path:
+def _resolve(source: str, scene_path: SearchPath) -> Path:
     if source in EMBEDDED:
-        return DATA / EMBEDDED[str(source)][0]
+        return DATA / EMBEDDED[source][0]
     path = Path(source)
-    if path.is_file():
+    if is_file(path):
         return path
-    found = find_scene(str(source), scene_path)
+    found = find_scene(source, scene_path)
     if found is None:
         if path.parent != Path():
             raise TilestampError(f"there is no scene file {path}")
         known = [name for name, _ in list_scenes(scene_path) if name not in NOT_SHIPPED or find_scene(name, scene_path)]
-        raise missing_scene(str(source), known, scene_path)
+        raise missing_scene(source, known, scene_path)
     return found
 
 

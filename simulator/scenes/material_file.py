@@ -3,6 +3,7 @@
 A missing library or texture is not fatal, as in every viewer: the surface is white, or shows its Kd, as a note says.
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_file
 from tilestamp.simulator.scenes.images import read_image
 from tilestamp.simulator.scenes.notes import Notes
 from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
@@ -80,8 +82,8 @@ def _uncommented(text: str) -> str:
 
 def _libraries(model: Path, line: str, notes: Notes) -> list[Path]:
     """Files of one mtllib line: one whose name may hold spaces, or several."""
-    whole = _beside(line, model)
-    names = [line] if whole else line.split()
+    whole = next((name for name in (line, _uncommented(line)) if _beside(name, model)), None)
+    names = [whole] if whole else re.findall(r'".+?"|\S+', _uncommented(line))
     found = [_beside(name, model) for name in names]
     for name, file in zip(names, found, strict=True):
         notes.add_if(file is None, f"the material library {name} is not there: what it would colour is white")
@@ -93,11 +95,8 @@ def _beside(name: str, *places: Path) -> Path | None:
     plain = name.strip().strip('"')
     for place in places:
         for form in (plain, plain.replace("\\", "/")):
-            try:
-                if form and (place.parent / form).is_file():
-                    return place.parent / form
-            except (OSError, ValueError):  # a name that no file can have
-                continue
+            if is_file(place.parent / form):
+                return place.parent / form
     return None
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_file
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.gltf_mesh import read_gltf
 from tilestamp.simulator.scenes.notes import Notes
@@ -33,7 +34,7 @@ def read_mesh(path: str | Path, notes: Notes | None = None) -> Mesh:
         Where the file cannot be read, has no triangles, or holds NaN or vertex numbers that do not exist.
     """
     path, notes = Path(path), Notes() if notes is None else notes
-    if not path.is_file():
+    if not is_file(path):
         raise TilestampError(f"{path}: there is no such file")
     return READERS.get(path.suffix.lower(), _read_foreign)(path, notes)
 

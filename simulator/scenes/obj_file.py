@@ -86,7 +86,9 @@ def _vertices(found: Scan, notes: Notes) -> tuple[NDArray[np.float64], NDArray[n
     infinite = ~np.isfinite(values).all(axis=1)
     if infinite.any():
         raise found.error(int(found.rows(Row.V)[infinite.argmax()]), "a vertex is NaN or infinite")
-    notes.add_if(((counts == 4) | (counts > 6)).any(), "a vertex's weight, or numbers after its colour, are not read")
+    weights = found.table(Row.V, 3, 4, "")[counts == 4, 3] if (counts == 4).any() else counts[:0]
+    notes.add_if((weights != 1.0).any(), "weights of vertices are not read")
+    notes.add_if(((counts == 5) | (counts > 6)).any(), "numbers behind a vertex's position or its colour are not read")
     colored = counts >= 6
     if not len(counts) or not colored.all():
         notes.add_if(
@@ -130,7 +132,7 @@ def _statements(found: Scan, notes: Notes) -> tuple[NDArray[np.int64], dict[str,
             starts.append(row)
             current.append(names.setdefault(_plain(rest), len(names)))
         elif word == "mtllib":
-            libraries.append(rest.strip())
+            libraries.append(rest)
         elif word not in SILENT:
             skipped[word[:20]] += 1
     skipped["numbers without a word"] = len(found.rows(Row.NUMBERS)) + len(found.rows(Row.VERTEX))

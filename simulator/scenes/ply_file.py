@@ -17,7 +17,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.notes import Notes
-from tilestamp.simulator.scenes.polygons import Polygons
+from tilestamp.simulator.scenes.polygons import Polygons, whole_numbers
 from tilestamp.simulator.scenes.strips import strip_triangles
 from tilestamp.simulator.scenes.text_scan import UTF8_MARK, UTF16_MARKS, plain_text, read_bytes, scan
 
@@ -56,9 +56,10 @@ def read_ply(path: Path, notes: Notes) -> Mesh:
     if header is None:
         raise TilestampError(f"{path}: cannot be read as a mesh: it has no PLY header")
     text, elements = _header(path, header[0].decode(errors="replace"), notes)
-    body = np.frombuffer(raw, np.uint8)[header.end() :]
+    end = header.end() - (header[0].count(b"\n") == 1 and header[0].endswith(b"\r\n"))  # a newline may be a number's
+    body = np.frombuffer(raw, np.uint8)[end:]
     if text:
-        body = _numbers(path, raw, header.end()).view(np.uint8)
+        body = _numbers(path, raw, end).view(np.uint8)
         for one in (one for element in elements for one in element.properties):
             one.kind = np.dtype("f8")
             one.count = one.count and one.kind
@@ -84,7 +85,7 @@ def _header(path: Path, text: str, notes: Notes) -> tuple[bool, list[_Element]]:
             elif words[:1] == ["property"]:
                 kind = np.dtype(TYPES[words[1]]).newbyteorder(ORDERS.get(order, "="))
                 white = 1.0 if kind.kind == "f" else float(np.iinfo(kind).max)
-                elements[-1].properties.append(_Property(words[2], kind, None, white))
+                elements[-1].properties.append(_Property(words[2].removeprefix("diffuse_"), kind, None, white))
             elif words[:2] == ["comment", "TextureFile"]:
                 notes.add("the texture of a PLY file is not read")
             elif words and words[0] not in ("ply", "comment", "obj_info", "end_header"):
@@ -141,7 +142,7 @@ def _polygons(path: Path, elements: dict[str, _Element], notes: Notes) -> Polygo
     columns = _columns(vertex, XYZ)
     normals = _columns(vertex, NORMAL) if all(axis in vertex.values for axis in NORMAL) else None
     corners, sizes = next(
-        ((face.values[name].astype(np.int64), face.lengths[name]) for name in CORNERS if name in face.lengths),
+        ((whole_numbers(face.values[name], path), face.lengths[name]) for name in CORNERS if name in face.lengths),
         (np.empty(0, np.int64), np.empty(0, np.int64)),
     )
     colors, face_colors = _colors(vertex, notes), _colors(face, notes)

@@ -76,6 +76,13 @@ class Polygons:
             )
 
 
+def whole_numbers(values: NDArray[Any], source: str | Path) -> Indices:
+    """Give vertex numbers as integers; raises TilestampError where one has a fraction."""
+    if values.dtype.kind == "f" and (broken := values % 1.0 != 0.0).any():
+        raise TilestampError(f"{source}: a face uses the vertex {values[broken.argmax()]:g}, which is no whole number")
+    return values.astype(np.int64)
+
+
 def triangulate(positions: Floats, corners: Indices, sizes: Indices) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Cut polygons into triangles.
 

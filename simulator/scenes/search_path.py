@@ -28,9 +28,9 @@ def scene_files(scene_path: SearchPath = None) -> list[Path]:
     """List the files of the search path that can be scenes: folder by folder, preferred kinds first, then by name."""
     found: dict[Path, None] = {}
     for folder in scene_folders(scene_path):
+        files = [path for level in range(LEVELS + 1) for path in sorted(folder.glob("*/" * level + "*"))]
         for suffix in SUFFIXES:
-            for level in range(LEVELS + 1):
-                found.update(dict.fromkeys(sorted(folder.glob("*/" * level + "*" + suffix))))
+            found.update(dict.fromkeys(path for path in files if path.suffix.lower() == suffix and path.is_file()))
     return list(found)
 
 

@@ -35,8 +35,12 @@ def read_stl(path: Path, notes: Notes) -> Mesh:
 
 def _text_points(path: Path, raw: bytes, notes: Notes) -> np.ndarray:
     lower = raw.lower()
-    points = (found := scan(path, lower)).table(Row.VERTEX, 3, 3, "a vertex needs three numbers")
-    facets, ends = (len(re.findall(word, lower)) for word in (rb"(?m)^\s*facet\b", rb"(?m)^\s*endfacet\b"))
+    facets, ends = (len(re.findall(word, lower)) for word in (rb"\bfacet\s+normal\b", rb"\bendfacet\b"))
+    found = scan(path, lower)
+    if len(found.rows(Row.VERTEX)) < 3 * facets:  # several to a line
+        nameless = re.sub(rb"\bsolid\b.*?(?=\bfacet\s+normal\b|\n|$)", b"solid ", lower)
+        found = scan(path, re.sub(rb"\s(?=(vertex|endloop|endfacet|endsolid)\b)", b"\n", nameless))
+    points = found.table(Row.VERTEX, 3, 3, "a vertex needs three numbers")
     if not 3 * facets == 3 * ends == len(points):
         what = f"{facets} facets begin, {ends} end, and they have {len(points)} vertices"
         raise TilestampError(f"{path}: cannot be read as a mesh: {what}")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
+from tilestamp.models.paths import is_file
 
 UTF8_MARK, UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 NEWLINE, SPACE, HASH, MINUS, PLUS, DOT, SLASH, ZERO, NINE, BACKSLASH = b"\n #-+./09\\"
@@ -105,19 +106,23 @@ class Scan:
 
 def read_bytes(path: Path) -> bytes:
     """Read a file, or raise a sentence."""
+    if not is_file(path):  # a folder, a pipe, a name that no file can have
+        raise TilestampError(f"{path}: there is no such file")
     try:
         return path.read_bytes()
     except OSError as error:
-        what = "there is no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror})"
-        raise TilestampError(f"{path}: {what}") from None
+        raise TilestampError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 def plain_text(raw: bytes) -> bytes:
-    """Give the UTF-8 text of a file: without byte order mark, lines ended by a newline."""
+    """Give the UTF-8 text of a file: without byte order marks, lines ended by a newline or a backslash before it."""
     if raw[:2] in UTF16_MARKS:
         raw = raw.decode("utf-16", errors="replace").encode()
-    raw = raw.removeprefix(UTF8_MARK)
-    return raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in raw else raw
+    raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in raw else raw
+    raw = raw.replace(b"\n" + UTF8_MARK, b"\n")  # of files that were put one behind another
+    while raw.startswith(UTF8_MARK):
+        raw = raw.removeprefix(UTF8_MARK)
+    return re.sub(rb"\\[ \t]*(?=\n|$)", rb"\\", raw).removesuffix(b"\\") if b"\\" in raw else raw
 
 
 def scan(path: Path, raw: bytes) -> Scan:
