@@ -38,7 +38,7 @@ def _text_points(path: Path, raw: bytes, notes: Notes) -> np.ndarray:
     facets, ends = (len(re.findall(word, lower)) for word in (rb"\bfacet\s+normal\b", rb"\bendfacet\b"))
     found = scan(path, lower)
     if len(found.rows(Row.VERTEX)) < 3 * facets:  # several to a line
-        nameless = re.sub(rb"\bsolid\b.*?(?=\bfacet\s+normal\b|\n|$)", b"solid ", lower)
+        nameless = re.sub(rb"solid\b.*?(?=\bfacet\s+normal\b|\n|$)", b"solid ", lower)
         found = scan(path, re.sub(rb"\s(?=(vertex|endloop|endfacet|endsolid)\b)", b"\n", nameless))
     points = found.table(Row.VERTEX, 3, 3, "a vertex needs three numbers")
     if not 3 * facets == 3 * ends == len(points):
