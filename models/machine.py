@@ -127,7 +127,7 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
         raise TilestampError(f"{path} is not a TOML file: {error}") from error
     machine = _build(table, str(path))
     shipped = FOLDER / f"{machine.name}.toml"
-    if shipped.is_file() and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
+    if is_file(shipped) and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
         machine = msgspec.structs.replace(machine, file=f"{path.name}, digest {machine.digest}")
     note("machines", machine.name, machine.digest)
     return machine

@@ -24,7 +24,7 @@ class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     description: str
-    compute_capability: str
+    compute_capability: Annotated[str, msgspec.Meta(pattern=r"^\d+\.\d+$")]
 
 
 class Sm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -219,3 +219,13 @@ def test_a_warp_of_another_size_issues_as_many_lanes_a_clock():
     assert (new.issue.fp32, new.pipe.sfu) == (1.0, 8.013 / 2)
     given = altered(load_machine("gtx280"), {"sm.warp_size": 16, "issue.fp32": 3.0}, "assumed", "test")
     assert (given.issue.fp32, given.issue.int32) == (3.0, 2.0)
+
+
+@pytest.mark.parametrize("capability", ["abc", "9", "9.0a", ""])
+def test_a_compute_capability_is_two_numbers(capability, edited):
+    with pytest.raises(TilestampError, match=r"identity\.compute_capability"):
+        load_machine(edited('compute_capability = "1.3"', f'compute_capability = "{capability}"'))
+
+
+def test_a_machine_may_have_a_name_that_no_file_can_have(edited):
+    assert load_machine(edited('name = "gtx280"', f'name = "{"x" * 300}"')).name == "x" * 300
