@@ -123,6 +123,8 @@ def test_the_published_cameras_are_read(shared):
         ({**LOOK, "far": 0.5}, "0 < near < far"),
         ({**AHEAD, "forward": [0, 0]}, "3 numbers each"),
         ({"eye": [0, 0, 1]}, "it has eye"),
+        ({**LOOK, "fov": 90}, "did you mean 'fov_degrees'"),
+        ({**LOOK, "farr": 90}, "did you mean 'far'"),
         (42, "42 is not a camera"),
         ("nowhere", "no such view"),
         ("missing.json", "missing.json: there is no such file"),
@@ -151,3 +153,7 @@ def test_what_is_wrong_with_a_camera_file_names_it(text, keys, sentence, tmp_pat
 def test_an_image_without_pixels_has_no_shape():
     with pytest.raises(TilestampError, match="0x3 pixels"):
         LookAt((0, 0, 1), (0, 0, 0)).matrix(0, 3)
+
+
+def test_a_camera_may_have_keys_that_describe_it():
+    assert read_camera({**LOOK, "name": "front", "note": "of the paper"}) == read_camera(LOOK)

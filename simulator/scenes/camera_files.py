@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 MATRIX_KEY = "model_to_clip"
 CameraSource = Camera | ArrayLike | Mapping[str, Any] | Path | None
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")
+KEYS = ("eye", "target", "position", "forward", "up", *OPTIONAL_KEYS)
 FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...} or {"position", "forward", "up", ...}'
 
 
@@ -100,6 +102,10 @@ def _what_there_is(document: object) -> str:
 def _from_mapping(fields: Mapping[str, Any]) -> Camera:
     if MATRIX_KEY in fields:
         return ModelToClip(fields[MATRIX_KEY])
+    for key in fields.keys() - KEYS:
+        near = get_close_matches(str(key), KEYS, 1, 0.75) or [k for k in OPTIONAL_KEYS if k[:3] == str(key)[:3]]
+        if near:
+            raise TilestampError(f"camera: {key!r} is no key of a camera (did you mean {near[0]!r}?)")
     options = {key: fields[key] for key in ("up", *OPTIONAL_KEYS) if key in fields}
     if "eye" in fields and "target" in fields:
         return LookAt(fields["eye"], fields["target"], **options)
