@@ -45,7 +45,7 @@ def refusal(error: str, sections: dict[str, Any], structs: Mapping[str, type[msg
     if not isinstance(limits, msgspec.Meta):
         return f"{message} - at {place}"
     if limits.pattern is not None:
-        return f"{place} is {reprlib.repr(values.get(key))}, not two numbers as 9.0"
+        return f"{place} is {reprlib.repr(values.get(key))}, not a text of two numbers as '9.0'"
     what = "a whole number" if get_args(kind)[0] is int else "a number"
     low = f"from {_read(limits.ge)}" if limits.gt is None else f"above {_read(limits.gt)}"
     value = reprlib.repr(values.get(key))

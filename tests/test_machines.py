@@ -223,7 +223,7 @@ def test_a_warp_of_another_size_issues_as_many_lanes_a_clock():
 
 @pytest.mark.parametrize("capability", ["abc", "9", "9.0a", ""])
 def test_a_compute_capability_is_two_numbers(capability, edited):
-    with pytest.raises(TilestampError, match=r"identity\.compute_capability is .*, not two numbers"):
+    with pytest.raises(TilestampError, match=r"identity\.compute_capability is .*, not a text of two numbers"):
         load_machine(edited('compute_capability = "1.3"', f'compute_capability = "{capability}"'))
 
 
