@@ -24,8 +24,14 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("gtx280", {"edges": "loaded", "bound": 8}),
         ("gtx280", {"hybrid": True}),
         ("gtx480", {"snap_edges": True, "tile": 32}),
-        ("h200", {"tile": 16, "spp": 4}),
-        ("h200", {"tile": 32, "box_tests": False}),
+        *(
+            ("h200", {"tile": tile, "spp": spp, "box_tests": box})  # each compiled by itself
+            for tile in (4, 8, 16, 32)
+            for spp in (1, 4, 16)
+            for box in (True, False)
+        ),
+        ("h200", {"edges": "loaded"}),
+        ("h200", {"snap_edges": True}),
         ("h200", {"bound_rule": "pixel_extent", "min_depth": 3, "near": 0.1}),
     ),
     "cudaraster": (
@@ -36,13 +42,19 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"release": "nvdiffrast"}),
         ("h200", {"release": "nvdiffrast", "copy_parameters": True}),
     ),
+    "freepipe": (("h200", {"early": True}),),
     "stamps": (("gtx280", {"stamp": 4, "touch": "polygon", "spp": 4}), ("h200", {"coarse": 16, "triangles": True})),
     "tiled": (
         ("gtx680", {"tile": 16, "capacity": "original"}),
         ("gtx680", {"tile": 32, "ssao": True}),
         ("h200", {"samples": "corners", "ssao": True}),
+        ("gtx680", {"texture_filter": "nearest"}),
     ),
-    "per-primitive": (("gtx680", {"cull_backfaces": False, "ssao": True}), ("h200", {"samples": "corners"})),
+    "per-primitive": (
+        ("gtx680", {"cull_backfaces": False, "ssao": True}),
+        ("h200", {"samples": "corners"}),
+        ("gtx680", {"texture_filter": "nearest"}),
+    ),
     "binned": (("h200", {"original_faults": True, "texture_layout": "rows", "texture_levels": 4}),),
     "hardware": (("h200", {"guard_band": False}),),
 }
@@ -70,23 +82,32 @@ class Frame(NamedTuple):
         return simulate(scene, self.pipeline, self.machine, width=width, height=height, **self.options)
 
 
+MIXED = ("gtx280", "gtx480", "h200")  # one for each mix of the stamp studies
 SOUP, EYE, CROWDS = "textured soup", "patches at the eye", "crowds"
 GENERATED_FRAMES = (
     Frame("micropolygon", EYE, "gtx280", {"bound": 16.0, "texture": TEXTURE}),
     Frame("micropolygon", EYE, "h200", {"near": 0.2, "spp": 4}),
     Frame("micropolygon", "teapot", "gtx480", {"tile": 4, "bound": 16.0}, (200, 150)),  # sums of blocks to add
+    Frame("micropolygon", "teapot", "gtx280", {"tile": 4, "bound": 16.0}, (200, 150)),
+    Frame("micropolygon", "teapot", "h200", {"tile": 4, "bound": 16.0}, (200, 150)),
+    Frame("micropolygon", "teapot", "h200", {"tile": 4, "bound": 8.0}),  # 3x3 slots
     Frame("cudaraster", SOUP, "gtx480", {"msaa": 2}),
+    Frame("cudaraster", SOUP, "gtx480", {"mode": "depth-only", "guard_band": False}),
+    Frame("cudaraster", SOUP, "gtx480", {"mode": "color", "guard_band": False}),
+    Frame("cudaraster", SOUP, "h200", {"release": "nvdiffrast", "copy_parameters": True}),
+    Frame("cudaraster", CROWDS, "h200", {"release": "nvdiffrast", "copy_parameters": True}, (520, 520)),
     Frame("cudaraster", CROWDS, "gtx480", {"cull_backfaces": False, "guard_band": False}, (300, 200)),
     Frame("cudaraster", CROWDS, "h200", {"release": "nvdiffrast"}, (520, 520)),
     Frame("cudaraster", "cut into six", "gtx480", {"guard_band": False, "first_frame": True}, (24, 24)),
     Frame("freepipe", SOUP, "gtx480", {"early": True}),
+    Frame("freepipe", SOUP, "gtx480", {}),
     Frame("freepipe", SOUP, "h200", {"packing": "32", "block": 64}),
     Frame("hardware", SOUP, "gtx480", {}),
-    Frame("stamps", SOUP, "gtx280", {"coarse": 16, "spp": 4}),
+    *(Frame("stamps", SOUP, machine, {"coarse": 16, "spp": 4}) for machine in MIXED),
     Frame("stamps", EYE, "h200", {"edge": 4.0}),
-    Frame("across-polygons", SOUP, "gtx280", {"packing": "sorted"}),
+    *(Frame("across-polygons", SOUP, machine, {"packing": "sorted"}) for machine in MIXED),
     Frame("across-polygons", EYE, "h200", {"packing": "repacked", "edge": 4.0, "triangles": True}),
-    Frame("bit-mask", EYE, "gtx280", {"mask": "depth", "edge": 4.0, "spp": 16}),
+    *(Frame("bit-mask", EYE, machine, {"mask": "depth", "edge": 4.0, "spp": 16}) for machine in MIXED),
     Frame("bit-mask", EYE, "gtx480", {"mask": "facing", "edge": 4.0}),
     Frame("bit-mask", SOUP, "h200", {"group": 16, "lanes": 8}),
     Frame("tiled", SOUP, "gtx680", {}),
