@@ -69,3 +69,9 @@ def test_a_time_may_differ_by_a_thousandth():
 
 def test_what_is_missing_or_new_is_seen():
     assert book.differences({("a",): "1"}, {("b",): "1"}) == ["a: no longer there", "b: new, 1"]
+
+
+@pytest.mark.parametrize("pipeline", pipeline_names())
+def test_every_price_of_a_pipeline_is_paid_in_the_ledger(pipeline):
+    """Else no frame of the ledger would tell of a change in it."""
+    assert frames.unpaid(pipeline) == []
