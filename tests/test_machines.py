@@ -229,3 +229,10 @@ def test_a_compute_capability_is_two_numbers(capability, edited):
 
 def test_a_machine_may_have_a_name_that_no_file_can_have(edited):
     assert load_machine(edited('name = "gtx280"', f'name = "{"x" * 300}"')).name == "x" * 300
+
+
+@pytest.mark.parametrize("name", list_machines())
+def test_shared_memory_has_the_banks_of_its_generation(name):
+    machine = load_machine(name)
+    first = machine.compute_capability.startswith("1.")
+    assert (machine.memory.banks, machine.memory.bank_lanes) == ((16, 16) if first else (32, 32))

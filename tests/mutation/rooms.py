@@ -93,6 +93,7 @@ def _of_machine(path: str) -> list[str]:
         *_ledger("micropolygon", "cudaraster", "hardware", "freepipe", "binned"),
         *_named(path),
         "tests/test_machines.py",
+        "tests/test_occupancy.py",
     ]
 
 
