@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tilestamp.models.bounds import bounds
 from tilestamp.models.counters import Counter
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
@@ -21,7 +22,7 @@ from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling import intervals
-from tilestamp.simulator.sampling.estimate import Estimate
+from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
@@ -158,7 +159,7 @@ class Run:
             known["milliseconds"] = (
                 intervals.exactly(timing.milliseconds)
                 if ran is None
-                else intervals.milliseconds(timing, work, ran, self.machine, changed)
+                else intervals.milliseconds(launch, timing, work, ran, self.machine, changed)
             )
         else:
             known["milliseconds"] = intervals.exactly(timing.milliseconds)
@@ -170,20 +171,22 @@ class Run:
             return None
         return self._launch(replace(work, table=work.sample.sampled, streams=(), atomic_requests=None))
 
-    def _changed(self, index: int, factor: float) -> float:
-        """Milliseconds of the ``index``-th launch, were all that is estimated ``factor`` times as large."""
+    def _changed(self, index: int, share: Floats, columns: tuple[int, ...]) -> Timing:
+        """Time of the ``index``-th launch, were what is estimated of each unit larger by a share of it."""
         work, launch, moved = self.frame.works[index], self.launches[index], self._traffic[index]
         assert isinstance(work, Work) and isinstance(launch, Launch) and work.sample is not None  # noqa: S101, PT018
-        change = work.table * (factor - 1)
+        change = work.table * share[:, None]
         change[:, list(work.sample.exact)] = 0.0
         priced = self._launch(replace(work, table=change, streams=()))  # type: ignore[arg-type]  # events are linear
-        launch = replace(launch, events=launch.events + priced.events)
-        if work.sample.streams is not None:
+        events = launch.events.copy()
+        events[:, columns] += priced.events[:, columns]
+        launch = replace(launch, events=events)
+        if work.sample.streams is not None and MachineEvent.LOAD_BYTES in columns:
             launch = replace(launch, streams=work.sample.streams(change.sum(axis=0)))
             launches = [*self.launches[:index], launch, *self.launches[index + 1 :]]
             moved = traffic(launches, self.machine)[index]
         level = schedule if self.timings[index].fidelity == "schedule" else bounds
-        return level(launch, self.machine, moved).milliseconds
+        return level(launch, self.machine, moved)
 
     @cached_property
     def _traffic(self) -> list[Traffic]:

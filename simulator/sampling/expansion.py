@@ -17,7 +17,7 @@ def expanded(sample: Sample) -> Integers:
     table = np.zeros((len(strata.order), sample.rows.shape[1]), np.int64)
     table[drawn(strata, taken)] = sample.rows
     if not sample.complete:
-        values, rest = sample.rows.astype(np.float64), _left(sample)
+        values, rest = sample.rows.astype(np.float64), left(sample)
         fit = fit_rows(sample, values)
         rows = product(strata.known[rest], fit.factors) + fit.residual[_nearest(sample)]
         np.maximum(rows, 0.0, out=rows)
@@ -30,7 +30,7 @@ def expanded(sample: Sample) -> Integers:
     return table
 
 
-def _left(sample: Sample) -> Integers:
+def left(sample: Sample) -> Integers:
     """Units that did not run, stratum after stratum."""
     ran = np.zeros(len(sample.strata.order), np.bool_)
     ran[places(sample.strata, sample.taken)] = True
@@ -39,7 +39,7 @@ def _left(sample: Sample) -> Integers:
 
 
 def _nearest(sample: Sample) -> Integers:
-    """For each unit of ``_left`` the row of the last before it, in launch order, that ran in its stratum."""
+    """For each unit of ``left`` the row of the last before it, in launch order, that ran in its stratum."""
     strata, rows = sample.strata, np.cumsum(sample.taken) - sample.taken
     found = []
     for first, end, taken, row in zip(strata.first[:-1], strata.first[1:], sample.taken, rows, strict=True):
