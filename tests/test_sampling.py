@@ -1,11 +1,14 @@
 """Sampling: intervals hold the full run's numbers, samples are exact parts of it, and everything is a pure function."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from tests.benchmarks.interval_coverage import coverage
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import t_quantile
 from tilestamp.simulator.sampling.expansion import expanded
 from tilestamp.simulator.sampling.strata import Sample, drawn, make_strata, pilot
@@ -93,6 +96,74 @@ def test_the_table_of_all_units_adds_up_to_the_estimates():
     wide = expanded(sample)
     assert wide.sum(axis=0) == pytest.approx(totals(sample, sample.rows.astype(float)).value, rel=1e-4)
     assert (wide[drawn(sample.strata, sample.taken)] == sample.rows).all()
+
+
+def test_totals_are_those_of_the_population_in_the_mean_whatever_the_shape():
+    size = population("skewed")[0]
+    table = (size**2)[:, None]
+    found = [
+        totals(sample := run_sample(size, table, seed, 0.5), sample.rows.astype(float)).value for seed in range(50)
+    ]
+    assert np.mean(found) == pytest.approx(table.sum(), rel=0.002)
+
+
+def test_the_first_sample_runs_all_of_the_largest_units():
+    size, _ = population("skewed")
+    strata = make_strata(size, [0])
+    taken = pilot(strata)
+    assert set(np.argsort(size, kind="stable")[-24:]) <= set(drawn(strata, taken))
+
+
+def test_what_is_known_of_all_units_is_no_part_of_the_sample():
+    size, table = population("even")
+    strata = make_strata(size, [0])
+    units = drawn(strata, pilot(strata))
+    sample = Sample(strata, pilot(strata), table[units], {1: table[:, 1]})
+    assert not sample.sampled[:, 1].any()
+    assert (sample.sampled[:, 0] == table[units, 0]).all()
+    assert (expanded(sample)[:, 1] == table[:, 1]).all()
+
+
+def test_units_that_did_not_run_are_as_unlike_as_those_that_ran():
+    size = np.full(3000, 40)
+    table = np.random.default_rng(3).choice([0, 100], 3000)[:, None]
+    assert expanded(run_sample(size, table, 0, 0.5)).std() == pytest.approx(50, rel=0.1)
+
+
+def one_time(monkeypatch, alone: float, beyond: float):
+    """A launch's time that is the first cost of all units, of which one may be long; and half-width and roof."""
+    size, table = population("even")
+    sample = run_sample(size, table, 0, 0.5)
+    wide = expanded(sample)
+    costs = sample.rows.astype(float)
+
+    def price(share, columns):
+        more = (share * wide[:, 0]).sum() if columns == intervals.ISSUED else 0.0
+        return timing(wide[:, 0].sum() + more + (beyond if columns == intervals.EVERYTHING else 0.0))
+
+    def timing(time):
+        return SimpleNamespace(milliseconds=float(time), cycles=1.0, terms={"issue": 1.0, "launch": 0.0})
+
+    monkeypatch.setattr(intervals, "_costs", lambda *_: costs)
+    monkeypatch.setattr(intervals, "demand", lambda *_: SimpleNamespace(alone=np.full(len(wide), alone)))
+    work = SimpleNamespace(sample=sample, table=wide)
+    found = intervals.milliseconds(None, timing(wide[:, 0].sum()), work, None, None, price)
+    return found.half_width - intervals.LEAST * found.value, totals(sample, costs).half_width[0]
+
+
+def test_a_time_is_as_unsure_as_the_cost_that_makes_it(monkeypatch):
+    half, expected = one_time(monkeypatch, alone=0.0, beyond=5000.0)
+    assert half == pytest.approx(expected, rel=0.01)
+
+
+def test_what_a_long_unit_may_decide_makes_a_time_less_sure(monkeypatch):
+    half, expected = one_time(monkeypatch, alone=1.0, beyond=5000.0)
+    assert half == pytest.approx(expected + 5000.0, rel=0.01)
+
+
+def test_few_units_an_sm_are_no_sample(monkeypatch):
+    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
+    assert not simulate("teapot", "micropolygon", "gtx280", error=0.3, width=160, height=120, fidelity="counts").sampled
 
 
 def test_a_larger_sample_holds_the_smaller_one():
