@@ -1,8 +1,9 @@
 """A machine: one GPU as numbers, each with its provenance.
 
 A machine file (``models/machines/NAME.toml``, or the user's own) has the sections below. Every number in it is
-written ``key = { value = 30, provenance = "published", source = "where from" }``; ``load_machine`` hands out plain
-numbers (``machine.sm.count``) and keeps where each came from in ``machine.provenance["sm.count"]``.
+written ``key = { value = 30, provenance = "published", source = "where from" }``, a fitted one with the cells that it
+was ``fitted_to`` (``tilestamp.models.fitted``); ``load_machine`` hands out plain numbers (``machine.sm.count``) and
+keeps where each came from in ``machine.provenance["sm.count"]``.
 Cycles are those of ``sm.clock_mhz``, the clock at which instructions issue (the shader clock up to Fermi).
 """
 
@@ -17,6 +18,7 @@ import msgspec
 import msgspec.structs
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.fitted import Fitted
 from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from tilestamp.models.paths import is_file
@@ -41,6 +43,7 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fixed_function: FixedFunction | None
     provenance: dict[str, tuple[Provenance, str]]  # "sm.count" -> kind, source
     digest: str  # of the numbers, for manifests
+    fitted_to: dict[str, tuple[str, ...]] = {}  # "atomics.conflict_ns" -> the cells that it was fitted to
     changes: dict[str, tuple[Any, Any]] = {}  # "sm.count" -> before, after; of a machine that was altered
     file: str = ""  # of a machine that is not the package's, although it bears its name
 
@@ -68,6 +71,20 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             bank_bytes=self.memory.bank_bytes,
             bank_mode_bytes=self.memory.bank_mode_bytes,
         )
+
+    @property
+    def as_moved(self) -> "Machine":
+        """The machine with the number that is moved now; every price is made on this one."""
+        fitted = [Fitted(f"{self.identity.name}: {key}", self._number(key), to) for key, to in self.fitted_to.items()]
+        values = {number.name.split(": ")[1]: number.value for number in fitted if number.value != number.number}
+        return altered(self, values, "fitted", "moved") if values else self
+
+    def _number(self, key: str) -> float:
+        *path, last = key.split(".")
+        part: Any = self
+        for step in path:
+            part = getattr(part, step)
+        return float(part[last] if isinstance(part, dict) else getattr(part, last))
 
     @property
     def clock_hz(self) -> float:
@@ -166,7 +183,8 @@ def altered(
             changes[key] = before, value
     sections = {key: table[key] for key in SECTIONS if table.get(key) is not None}
     origins = machine.provenance | dict.fromkeys(values, (provenance, source))
-    marks = {"changes": changes, "file": machine.file}
+    fitted_to = {key: cells for key, cells in machine.fitted_to.items() if key not in values}
+    marks = {"changes": changes, "file": machine.file, "fitted_to": fitted_to}
     changed = msgspec.structs.replace(_convert(sections, origins, machine.name), **marks)
     note("machines", changed.name, changed.digest)
     return changed
@@ -177,29 +195,40 @@ def _build(table: dict[str, Any], file: str) -> Machine:
     _check_keys(table, list(SECTIONS), {"fixed_function"}, "section", file)
     sections: dict[str, Any] = {}
     origins: dict[str, tuple[Provenance, str]] = {}
+    fitted_to: dict[str, tuple[str, ...]] = {}
     for name, struct in SECTIONS.items():
         if name not in table:
             continue
         optional = {field.name for field in msgspec.structs.fields(struct) if not field.required}
         _check_keys(table[name], list(struct.__struct_fields__), optional, f"key of [{name}]", file)
-        sections[name] = table[name] if name == "identity" else _plain(table[name], name, origins, file)
-    return _convert(sections, origins, file)
+        sections[name] = table[name] if name == "identity" else _plain(table[name], name, origins, fitted_to, file)
+    return msgspec.structs.replace(_convert(sections, origins, file), fitted_to=fitted_to)
 
 
-def _plain(table: dict[str, Any], prefix: str, origins: dict[str, tuple[Provenance, str]], file: str) -> dict[str, Any]:
-    """Values of a section; their provenance goes to ``origins``."""
+def _plain(
+    table: dict[str, Any],
+    prefix: str,
+    origins: dict[str, tuple[Provenance, str]],
+    fitted_to: dict[str, tuple[str, ...]],
+    file: str,
+) -> dict[str, Any]:
+    """Values of a section; their provenance goes to ``origins``, the cells of fitted ones to ``fitted_to``."""
     values: dict[str, Any] = {}
     for key, entry in table.items():
         name = f"{prefix}.{key}"
         if isinstance(entry, dict) and "value" not in entry and key == "per_clock":
-            values[key] = _plain(entry, name, origins, file)
+            values[key] = _plain(entry, name, origins, fitted_to, file)
             continue
-        if not isinstance(entry, dict) or set(entry) != {"value", "provenance", "source"}:
+        if not isinstance(entry, dict) or entry.keys() - {"fitted_to"} != {"value", "provenance", "source"}:
             raise TilestampError(f"{file}: {name} must be written {{ value = ..., provenance = ..., source = ... }}")
+        if (entry["provenance"] == "fitted") != ("fitted_to" in entry):
+            raise TilestampError(f"{file}: {name} must say what it was fitted_to if it is fitted, and only then")
         if entry["provenance"] not in get_args(Provenance):
             raise TilestampError(f"{file}: {name} has the unknown provenance {entry['provenance']!r}")
         values[key] = entry["value"]
         origins[name] = (entry["provenance"], str(entry["source"]))
+        if "fitted_to" in entry:
+            fitted_to[name] = tuple(map(str, entry["fitted_to"]))
     return values
 
 

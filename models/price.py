@@ -48,6 +48,7 @@ def price(
     if fidelity not in FIDELITIES:
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
     note("machines", machine.name, machine.digest)
+    machine = machine.as_moved
     moved = traffic(launches, machine)
     if fidelity == "auto":
         return auto(launches, machine, moved, error)

@@ -13,7 +13,9 @@ TEMPLATE = """<!doctype html>
  td, th { padding: .15rem .6rem; text-align: right; }
  th { border-bottom: 1px solid #999; }
  td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
- tr.fitted td { color: #888; font-style: italic; } tr.missed td.error { color: #b00020; font-weight: 600; }
+ tr.fitted td { color: #888; font-style: italic; }
+ td:nth-child(10) { text-align: left; font-size: 11px; max-width: 22rem; }
+ tr.missed td.error { color: #b00020; font-weight: 600; }
  nav ul { margin: .2rem 0 .8rem; padding-left: 1.2rem; } nav p { margin: .2rem 0; } a { color: #1f5aa6; }
  img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
  table.overview td, table.overview th { text-align: left; vertical-align: top; border-bottom: 1px solid #eee; }
@@ -39,6 +41,8 @@ TEMPLATE = """<!doctype html>
 {% for row in result.rows %}<tr class="{{ row.marks }}">{% for value in row.cells %}
 <td{% if loop.index0 == result.error_column %} class="error"{% endif %}>{{ value }}</td>{% endfor %}</tr>
 {% endfor %}</table>{% endif %}
+{% for sentence in result.averages %}<p><b>{{ sentence }}</b></p>
+{% endfor %}
 {% for figure in result.figures %}<p><img src="{{ figure }}" alt="{{ figure }}"></p>{% endfor %}
 {% for note in result.notes %}<p>{{ note }}</p>{% endfor %}
 {% endfor %}
@@ -56,8 +60,8 @@ def write_page(path: Path, title: str, introduction: str, results: Sequence[dict
         HTML file to write.
     results : sequence of dict
         Each with name, group and what the group is about, title, source, warnings, columns, rows (cells and marks),
-        error_column, figures (paths relative to the page) and notes; and perhaps ``overview``, a table to stand before
-        it: name, title, file, columns, rows (the section that a row is from, and cells).
+        error_column, averages (sentences), figures (paths relative to the page) and notes; and perhaps ``overview``, a
+        table to stand before it: name, title, file, columns, rows (the section that a row is from, and cells).
     """
     from jinja2 import Environment
 

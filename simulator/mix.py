@@ -13,13 +13,17 @@ A mix file (``simulator/mixes/PIPELINE/ccN.toml``) has a table for each kernel, 
     chain_alu = 12               # dependent instructions on a unit's critical warp
     lanes = "BOX_LANES"          # the event that counts the lanes active meanwhile; absent: whole warps
 
+What was fitted to measured cells says which of its columns were (``fitted = ["chain_alu"]``, or ``{ int32 = 2.09 }``
+where only so much of one was) and to which cells (``fitted_to``: ``tilestamp.models.fitted``, or the name of a list in
+the table ``fits`` of the file). Without ``fitted`` all columns of a table of provenance ``fitted`` were.
+
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
 """
 
 import hashlib
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
@@ -30,13 +34,14 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
+from tilestamp.models.fitted import Fitted
 from tilestamp.models.launch import Launch
 from tilestamp.models.used import note
 from tilestamp.simulator.work import Work
 
 MIXES = Path(__file__).parent / "mixes"
 PROVENANCES = ("published", "measured", "disassembled", "derived", "fitted", "assumed")
-_ABOUT = {"provenance", "source", "lanes"}
+_ABOUT = {"provenance", "source", "lanes", "fitted", "fitted_to"}
 _COLUMNS = {event.name.lower(): event for event in MachineEvent}
 
 
@@ -52,6 +57,8 @@ class KernelMix:
         By event name: warp instructions and chain steps by machine event name, and ``lanes``.
     provenance : dict
         By event name ("" for the kernel): (kind, source).
+    fitted : dict
+        By event and column: what was fitted of a price.
     """
 
     kernel: str
@@ -59,6 +66,17 @@ class KernelMix:
     shared_bytes: int
     prices: dict[str, dict[str, Any]]
     provenance: dict[str, tuple[str, str]]
+    fitted: dict[tuple[str, str], Fitted] = field(default_factory=dict)
+
+    @property
+    def as_moved(self) -> "KernelMix":
+        """The kernel with the number that is moved now."""
+        moves = {place: number.value - number.number for place, number in self.fitted.items()}
+        prices = dict(self.prices)
+        for (event, column), change in moves.items():
+            if change:
+                prices[event] = prices[event] | {column: prices[event][column] + change}
+        return replace(self, prices=prices) if any(moves.values()) else self
 
     @cache  # noqa: B019 - mixes are read once and kept
     def matrix(self, events: type[IntEnum], warp: int) -> NDArray[np.float64]:
@@ -114,6 +132,7 @@ class Mix:
         kernel = self.kernels.get(f"{work.kernel}: {work.variant}") or self.kernels.get(work.kernel)
         if kernel is None:
             raise TilestampError(f"the mix {self.name} has no kernel {work.kernel}")
+        kernel = kernel.as_moved
         return Launch(
             stage=work.stage,
             kernel=work.kernel,
@@ -140,7 +159,9 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
     path = _path_for(pipeline, int(float(compute_capability)))
     text = path.read_text("utf-8")
     name = f"{pipeline}/{path.stem}"
-    kernels = {kernel: _kernel_mix(name, kernel, table) for kernel, table in tomllib.loads(text).items()}
+    tables = tomllib.loads(text)
+    fits = tables.pop("fits", {})
+    kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in tables.items()}
     return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
 
 
@@ -152,7 +173,7 @@ def _path_for(pipeline: str, major: int) -> Path:
     return max([f for f in families if f[0] <= major] or families[:1])[1]
 
 
-def _kernel_mix(mix: str, kernel: str, table: dict[str, Any]) -> KernelMix:
+def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, list[str]]) -> KernelMix:
     """Check one kernel's table and take it apart."""
     prices = {event: price for event, price in table.items() if isinstance(price, dict)}
     about = {"": (str(table.get("provenance", "")), str(table.get("source", "")))}
@@ -164,4 +185,26 @@ def _kernel_mix(mix: str, kernel: str, table: dict[str, Any]) -> KernelMix:
     for event, (kind, _) in about.items():
         if kind not in PROVENANCES:
             raise TilestampError(f"the mix {mix} does not say where {kernel}.{event or 'registers'} comes from")
-    return KernelMix(kernel, int(table.get("registers", 16)), int(table.get("shared_bytes", 0)), prices, about)
+    fitted = {
+        (event, column): Fitted(f"{mix}: {kernel}.{event}.{column}", part, _cells(mix, kernel, price, table, fits))
+        for event, price in prices.items()
+        for column, part in _fitted_parts(price, about[event][0]).items()
+    }
+    return KernelMix(kernel, int(table.get("registers", 16)), int(table.get("shared_bytes", 0)), prices, about, fitted)
+
+
+def _fitted_parts(price: dict[str, Any], kind: str) -> dict[str, float]:
+    """What was fitted of each column of an event."""
+    parts = price.get("fitted", sorted(price.keys() - _ABOUT) if kind == "fitted" else [])
+    return dict(parts) if isinstance(parts, dict) else {column: float(price[column]) for column in parts}
+
+
+def _cells(
+    mix: str, kernel: str, price: dict[str, Any], table: dict[str, Any], fits: dict[str, list[str]]
+) -> tuple[str, ...]:
+    """The cells that an event was fitted to."""
+    cells = price.get("fitted_to", table.get("fitted_to", ()))
+    found = fits.get(cells) if isinstance(cells, str) else cells
+    if not found:
+        raise TilestampError(f"the mix {mix} does not say what {kernel} was fitted_to, by cells or by a list in fits")
+    return tuple(map(str, found))

@@ -15,6 +15,7 @@ from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
+from tilestamp.models.remembered import priced_property
 from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic, traffic
@@ -83,7 +84,7 @@ class Run:
         """Input index of the visible triangle, (H, W) int32, row 0 the top row, -1 where nothing was drawn."""
         return self.frame.triangle_ids
 
-    @cached_property
+    @priced_property
     def launches(self) -> list[Launch | PipeLaunch]:
         """One for each kernel launch, in machine events."""
         self._check_counted()
@@ -95,12 +96,12 @@ class Run:
         """Price events in instructions; a pipeline that is fixed function throughout has no mix."""
         return load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
 
-    @cached_property
+    @priced_property
     def timings(self) -> list[Timing]:
         """Time of each launch, in launch order; empty terms at fidelity ``counts``."""
         return price(self.launches, self.machine, self.fidelity, self.error)
 
-    @cached_property
+    @priced_property
     def stages(self) -> "pd.DataFrame":
         """One row a stage, in the order of the pipeline: counts, rates, cycles, milliseconds, bound."""
         table = stage_table(self.frame.works, self.launches, self.timings, self.machine.sm.warp_size)
@@ -127,7 +128,7 @@ class Run:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
 
-    @cached_property
+    @priced_property
     def intervals(self) -> dict[tuple[str, str], Estimate]:
         """Value, low and high of 95 % intervals by stage (``frame``: all) and number.
 
@@ -141,7 +142,7 @@ class Run:
                 parts.setdefault(("frame", name), []).append(estimate)
         return {key: intervals.add(estimates) for key, estimates in parts.items()}
 
-    @cached_property
+    @priced_property
     def launch_intervals(self) -> list[dict[str, Estimate]]:
         """The numbers of ``intervals`` of each launch, in launch order."""
         return [self._intervals(index) for index in range(len(self.launches))]

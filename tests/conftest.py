@@ -24,13 +24,24 @@ def real_scenes() -> str:
     return os.pathsep.join(map(str, folders))
 
 
+class SharedFolder(type(Path())):  # type: ignore[misc]  # the class of paths here
+    """The folder of real scenes and measurements: whoever takes measurements that are not there is skipped."""
+
+    def __truediv__(self, name: str) -> Path:
+        """A path in it."""
+        path: Path = super().__truediv__(name)
+        if Path(name).parts[:1] == ("silicon",) and self == shared_folder() and not Path(self, "silicon").is_dir():
+            pytest.skip(f"no folder 'silicon' in {self}: there are scenes, and no measurements on a GPU")
+        return path
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Give the folder of real scenes and measurements; skip where it is missing."""
     folder = shared_folder()
     if not folder.is_dir():
         pytest.skip(f"no folder {folder.name!r} beside the project: set {SHARED_VARIABLE} to where the real scenes are")
-    return folder
+    return SharedFolder(folder)
 
 
 @pytest.fixture(scope="session", autouse=True)

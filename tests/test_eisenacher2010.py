@@ -7,7 +7,9 @@ import pytest
 
 from tilestamp import load_scene
 from tilestamp.experiments.eisenacher2010 import claims, figure4, frames, table1, table2, table3
-from tilestamp.experiments.harness.result import Result
+from tilestamp.experiments.harness.fit import run_judged
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.write import draw_figure
 from tilestamp.simulator.run import Run
 
 EXPERIMENTS = (claims, figure4, table1, table2, table3)
@@ -24,12 +26,12 @@ def tiny(name: str = "killeroo", width: int = 0, height: int = 0, **options: obj
 
 
 def small(name: str) -> Result:
-    """Run one experiment on the teapot in small frames."""
+    """Run one experiment on the teapot in small frames, and say how fitted its cells are."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(frames, "model", cache(lambda _: replace(load_scene("teapot"), note=NOTE)))
         module = next(m for m in EXPERIMENTS if m.__name__.endswith(name))
         patch.setattr(module, "frame", tiny)
-        return module.run(lambda _: None)
+        return run_judged(module.run, lambda _: None)[0]
 
 
 @pytest.fixture(scope="module", params=[m.__name__.rpartition(".")[2] for m in EXPERIMENTS])
@@ -51,26 +53,29 @@ def test_a_cell_with_an_aim_has_a_published_value(result):
 
 def test_figures_are_drawn(result, tmp_path):
     for figure in result.figures:
-        figure.draw(tmp_path / f"{figure.name}.png")
+        draw_figure(figure, result, tmp_path / f"{figure.name}.png")
         assert (tmp_path / f"{figure.name}.png").stat().st_size > 0
 
 
-def statuses(result: Result) -> dict[tuple[str, str], str]:
-    return {(cell.row, cell.column): cell.status for cell in result.cells}
+def by_place(result: Result) -> dict[tuple[str, str], Cell]:
+    return {(cell.row, cell.column): cell for cell in result.cells}
 
 
-def test_table_1_fits_two_atomic_parameters_on_two_cells():
-    fitted = [
-        row
-        for (row, column), s in statuses(small("table1")).items()
-        if (column, s) == ("address calculation", "fitted")
-    ]
-    assert fitted == ["4x4", "32x32"]
+def numbers(cell: Cell) -> dict[str, float]:
+    """What a cell follows of each fitted number, by the last part of its name."""
+    return {name.split(": ")[-1].split(".", 1)[-1]: part for name, part in cell.fitted_by}
 
 
-def test_table_1_predicts_every_bucket_write():
-    cells = statuses(small("table1"))
-    assert {cells[f"{n}x{n}", "bucket write"] for n in (4, 8, 16, 32)} == {"predicted"}
+@pytest.mark.parametrize("tile", [4, 8, 16, 32])
+def test_table_1_follows_its_two_atomic_numbers_at_every_tile(tile):
+    cell = by_place(small("table1"))[f"{tile}x{tile}", "address calculation"]
+    assert {"conflict_ns", "unit_ns_per_request"} & numbers(cell).keys()
+    assert cell.status != "predicted"
+
+
+def test_cells_that_a_number_was_chosen_on_are_fitted():
+    cells = by_place(small("table1"))
+    assert {cells[f"{n}x{n}", "address calculation"].status for n in (4, 32)} == {"fitted"}
 
 
 def test_table_1_leaves_out_the_tile_raster_that_a_gtx_280_cannot_launch():
@@ -79,17 +84,51 @@ def test_table_1_leaves_out_the_tile_raster_that_a_gtx_280_cannot_launch():
     assert run.milliseconds > 0
 
 
-def test_table_2_fits_one_patch_count_a_model_and_no_time():
-    cells = statuses(small("table2"))
-    fitted = [(row.split()[0], column) for (row, column), status in cells.items() if status == "fitted"]
-    assert sorted(fitted) == [("bigguy", "patches"), ("killeroo", "patches"), ("teapot", "patches")]
+def test_table_2_is_predicted_on_other_screens_and_models_and_not_on_the_frame_of_the_fits():
+    cells = by_place(small("table2"))
+    assert cells["killeroo 512x512 BB 4", "1 spp"].status == "predicted"
+    assert cells["teapot 1600x1200 BB 4", "1 spp"].status == "predicted"  # but for its view, which is not drawn here
+    assert cells["killeroo 1600x1200 BB 4", "1 spp"].status == "partly fitted"
+    assert numbers(cells["killeroo 1600x1200 BB 8", "4 spp"]).keys() >= {"EXAMINE_WARPS.fp32"}
 
 
-def test_table_3_marks_one_fitted_cell_a_number_that_was_chosen():
-    cells = statuses(small("table3"))
-    fitted = {key for key, status in cells.items() if status == "fitted"}
-    assert {("bound and split", "1 spp"), ("setup", "1 spp"), ("sampling", "16 spp"), ("sampling", "hybrid")} <= fitted
-    assert cells["sampling", "4 spp"] == cells["total", "1 spp"] == "predicted"
+def test_table_3_is_fitted_where_a_number_was_chosen():
+    cells = by_place(small("table3"))
+    chosen = [("system overhead", "1 spp"), ("bound and split", "1 spp"), ("setup", "1 spp")]
+    chosen += [("sampling", "16 spp"), ("sampling", "hybrid")]
+    assert {cells[place].status for place in chosen} == {"fitted"}
+
+
+def test_table_3_the_hybrids_total_says_what_of_it_is_fitted():
+    cell = by_place(small("table3"))["total", "hybrid"]
+    assert cell.status != "predicted"
+    assert numbers(cell).keys() >= {"per_clock.primitives", "EXAMINE_WARPS.fp32", "milliseconds of system overhead"}
+
+
+def test_table_3_the_hybrids_bound_and_split_is_that_of_the_software():
+    cells = by_place(small("table3"))
+    hybrid, software = cells["bound and split", "hybrid"], cells["bound and split", "1 spp"]
+    assert hybrid.status == "fitted"
+    assert hybrid.fitted_by == software.fitted_by
+    assert hybrid.of == (("bound and split", "1 spp"),)
+
+
+def test_table_3_samplings_follow_the_edge_set_up():
+    cells = by_place(small("table3"))
+    assert all("EDGE_SETUP_WARPS.fp32" in numbers(cells["sampling", f"{spp} spp"]) for spp in (4, 16))
+
+
+def test_table_3_counts_totals_and_ratios_once():
+    cells = by_place(small("table3"))
+    made = {place for place, cell in cells.items() if cell.of}
+    assert {("total", "1 spp"), ("total", "4 spp"), ("total", "16 spp"), ("total", "hybrid")} < made
+    assert cells["frames a second", "software : hybrid"].of == (("total", "hybrid"), ("total", "1 spp"))
+
+
+@pytest.mark.parametrize("name", ["table1", "table3", "figure4"])
+def test_cells_are_made_of_cells_that_are_there(name):
+    cells = by_place(small(name))
+    assert all(place in cells for cell in cells.values() for place in cell.of)
 
 
 def test_table_3_divides_the_tile_raster_into_setup_and_sampling():
@@ -108,4 +147,4 @@ def test_figure_4_names_an_order_of_its_three_tiles_at_each_zoom():
 def test_claims_average_no_cell_that_was_fitted():
     result = small("claims")
     assert result.predicted_errors == []
-    assert "fitted" in {cell.status for cell in result.cells}
+    assert by_place(result)["box tests", "share of total time saved"].status == "fitted"

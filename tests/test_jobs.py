@@ -1,5 +1,6 @@
 """Experiments in processes of their own."""
 
+import json
 import os
 import signal
 import subprocess
@@ -10,8 +11,9 @@ import pytest
 
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
-from tilestamp.experiments.harness.result import Result
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.models.errors import MissingInputError
+from tilestamp.models.fitted import Fitted
 
 
 @pytest.fixture
@@ -51,6 +53,20 @@ def test_what_an_experiment_says_is_passed_on(experiments, tmp_path):
     experiments["a/x"] = lambda say: say("half way") or Result(name="a/x", title="", source="", cells=[])
     list(run_experiments(["a/x"], tmp_path, {}, said.append, 1))
     assert said == ["a/x", "half way"]
+
+
+def test_how_fitted_the_cells_are_is_computed(experiments, tmp_path):
+    number = Fitted("gpu: clock", 2.0, ("cow 64x48",))
+
+    def run(_say):
+        cell = Cell("a", "b", "ms", published=4.0, ours=2.0 + number.value, frame="cow 64x48")
+        return Result(name="a/x", title="", source="", cells=[cell])
+
+    experiments["a/x"] = run
+    (outcome,) = run_experiments(["a/x"], tmp_path, {}, lambda _: None, 1)
+    assert outcome.result.cells[0].fitted_by == (("gpu: clock", pytest.approx(0.5)),)
+    manifest = json.loads((tmp_path / "a-x" / "manifest.json").read_text())
+    assert manifest["fitted numbers"] == {"gpu: clock": "cow 64x48"}
 
 
 def test_missing_input_is_said_in_its_place_and_the_others_go_on(experiments, tmp_path, capsys):

@@ -13,7 +13,8 @@ from tilestamp.experiments.harness.jobs import run_experiments
 from tilestamp.experiments.harness.result import Result
 from tilestamp.models.machine import FOLDER
 from tilestamp.models.price import price
-from tilestamp.models.used import collect, remembered
+from tilestamp.models.remembered import remembered
+from tilestamp.models.used import collect
 from tilestamp.simulator import mix
 from tilestamp.simulator.manifest import used_manifest
 

@@ -7,13 +7,15 @@ import pytest
 
 from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow, process_of, select
 from tilestamp.experiments.harness.result import Cell, Result
-from tilestamp.experiments.harness.write import cell_texts, write_index, write_result
+from tilestamp.experiments.harness.texts import averages, cell_texts
+from tilestamp.experiments.harness.write import write_index, write_result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result
 from tilestamp.models.errors import TilestampError
 
 
-def cell(published: float | str | None = 10.0, ours: float | str = 11.0, status: str = "predicted") -> Cell:
-    return Cell("row", "column", "ms", published=published, ours=ours, status=status, aim=0.05)
+def cell(published: float | str | None = 10.0, ours: float | str = 11.0, **more) -> Cell:
+    settings = {"row": "row", "column": "column", "unit": "ms", "aim": 0.05} | more
+    return Cell(published=published, ours=ours, **settings)
 
 
 def result(*cells: Cell) -> Result:
@@ -41,6 +43,63 @@ def test_a_fitted_cell_is_never_missed_and_never_averaged():
     assert result(fitted, cell()).predicted_errors == [pytest.approx(0.1)]
 
 
+@pytest.mark.parametrize("status", ["partly fitted", "reproduced"])
+def test_what_is_not_fitted_can_be_missed_but_is_not_averaged(status):
+    assert cell(status=status).missed
+    assert result(cell(status=status)).predicted_errors == []
+
+
+@pytest.mark.parametrize("ours", [float("nan"), float("inf"), "no time"])
+def test_what_is_no_number_is_missed_and_has_no_error(ours):
+    assert cell(ours=ours).missed
+    assert cell(ours=ours, aim=None).missed
+    assert cell(ours=ours).error is None
+
+
+def test_where_nothing_is_published_nothing_is_missed():
+    assert not cell(None, 3.0).missed
+    assert not cell(float("nan"), 3.0).missed
+    assert not cell(None, float("nan")).missed
+
+
+def test_a_published_zero_is_missed_by_anything_else():
+    assert cell(0.0, 1e-3).missed
+    assert not cell(0.0, 0.0).missed
+    assert not cell(0.0, 1e-3, aim=None).missed
+
+
+def test_times_and_counts_are_averaged_apart():
+    both = result(cell(), cell(ours=12.0, unit="", column="count"))
+    assert both.errors("predicted", times=True) == [pytest.approx(0.1)]
+    assert both.errors("predicted", times=False) == [pytest.approx(0.2)]
+    assert averages(both) == [
+        "1 predicted times: mean error 10.0 %, worst 10.0 %; 1 predicted counts: mean error 20.0 %, worst 20.0 %"
+    ]
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns/triangle", "ns/triangle, gtx680"])
+def test_units_of_time(unit):
+    assert cell(unit=unit).is_time
+
+
+@pytest.mark.parametrize("unit", ["", "%", "1/s", "MB", "samples"])
+def test_units_of_something_else(unit):
+    assert not cell(unit=unit).is_time
+
+
+def test_a_cell_made_of_averaged_ones_is_not_averaged_again():
+    total = cell(ours=15.0, column="total", of=(("row", "column"),))
+    assert result(cell(), total).predicted_errors == [pytest.approx(0.1)]
+    assert result(cell(status="fitted"), total).predicted_errors == [pytest.approx(0.5)]
+
+
+def test_partly_fitted_cells_have_an_average_of_their_own():
+    assert averages(result(cell(), cell(ours=13.0, status="partly fitted"))) == [
+        "1 predicted times: mean error 10.0 %, worst 10.0 %",
+        "1 partly fitted times: mean error 30.0 %, worst 30.0 %",
+    ]
+
+
 def test_an_order_that_differs_is_missed():
     assert cell("a < b", "b < a").missed
     assert not cell("a < b", "a < b").missed
@@ -54,6 +113,26 @@ def test_a_cell_is_predicted_unless_it_says_so():
 def test_texts_show_error_and_status():
     assert "+10.0 %" in cell_texts(cell())
     assert "fitted" in cell_texts(cell(status="fitted"))
+
+
+def test_texts_name_the_fitted_numbers_and_their_share():
+    texts = cell_texts(cell(status="partly fitted", share=0.5, fitted_by=(("gpu: clock", 0.3), ("mix: alu", 0.2))))
+    assert texts[-3:] == ("5 %", "50 %", "gpu: clock 30 %; mix: alu 20 %")
+
+
+def test_the_page_and_the_table_of_cells_name_the_fitted_numbers(tmp_path):
+    partly = result(cell(status="partly fitted", share=0.5, fitted_by=(("gpu: clock", 0.5),)))
+    assert "gpu: clock 50 %" in write_index([partly], tmp_path).read_text()
+    table = pd.read_csv(write_result(partly, tmp_path, {}) / "cells.csv")
+    assert table[["status", "share", "fitted by"]].iloc[0].tolist() == ["partly fitted", 0.5, "gpu: clock 50 %"]
+
+
+def test_the_page_has_the_averages(tmp_path):
+    assert "1 predicted times: mean error 10.0 %" in write_index([result(cell())], tmp_path).read_text()
+
+
+def test_a_missed_cell_is_red_on_the_page(tmp_path):
+    assert 'class="predicted missed"' in write_index([result(cell())], tmp_path).read_text()
 
 
 def test_a_result_is_written_as_csv_and_manifest(tmp_path):

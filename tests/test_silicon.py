@@ -3,17 +3,20 @@
 import numpy as np
 import pytest
 
+from tilestamp.experiments.calibration import freepipe_mix
 from tilestamp.experiments.calibration.cudaraster_blocks import CHAINS, LANES, RUNS, Run
 from tilestamp.experiments.calibration.cudaraster_mix import FITTED, chain, instructions
 from tilestamp.experiments.calibration.mix_from_sass import RASTER, main
 from tilestamp.experiments.calibration.raster_sections import raster_sections
 from tilestamp.experiments.calibration.sass import Instruction, basic_blocks, classes, cycles, read_functions
+from tilestamp.experiments.harness.result import Cell
 from tilestamp.experiments.silicon.h200 import status
 from tilestamp.experiments.silicon.leave_one_out import refit
 from tilestamp.models.events import EVENTS
 from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.machine import load_machine
 from tilestamp.models.traffic import traffic
+from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
@@ -67,11 +70,31 @@ def test_the_mix_in_the_package_is_what_the_machine_code_says(shared):
 
 
 def test_a_cell_that_gave_a_number_is_fitted_and_no_other():
-    assert status("teapot_512x512_bb4", "k_raster", "time") == "fitted"
-    assert status("teapot_512x512_bb4", "k_raster", "instructions") == "predicted"
-    assert status("bunny", "freepipe", "instructions") == "fitted"
-    assert status("bunny", "freepipe_early", "load sectors") == "predicted"
-    assert status("bunny", "fineRaster", "time") == "predicted"
+    machine = load_machine("h200")
+    kernels = [kernel for name in ("cudaraster", "freepipe") for kernel in load_mix(name, "9.0").kernels.values()]
+    targets = [cell for kernel in kernels for number in kernel.fitted.values() for cell in number.fitted_to]
+    targets += [cell for cells in machine.fitted_to.values() for cell in cells]
+
+    def of(scene, kernel, quantity):
+        cell = Cell(f"{scene} 512", f"{kernel} {quantity}", "", published=1.0, ours=1.0, frame=f"{scene} 512")
+        return status(targets, cell)
+
+    assert of("teapot_512x512_bb4", "k_raster", "time") == "fitted"
+    assert of("teapot_512x512_bb4", "k_raster", "instructions") == "predicted"
+    assert of("bunny", "freepipe", "instructions") == "fitted"
+    assert of("bunny", "binRaster as published", "time") == "fitted"
+    assert of("bunny", "binRaster as published", "atomic instructions") == "predicted"
+    assert of("bunny", "freepipe_early", "load sectors") == "predicted"
+    assert of("bunny", "fineRaster", "time") == "predicted"
+    assert of("bunny_5k", "freepipe", "instructions") == "predicted"
+
+
+def test_the_generators_and_the_mixes_agree_on_what_is_fitted():
+    for name, chosen in (("cudaraster", FITTED), ("freepipe", freepipe_mix.FITTED)):
+        kernels = load_mix(name, "9.0").kernels
+        for kernel, events in chosen.items():
+            found = {event: n.number for (event, column), n in kernels[kernel].fitted.items() if column == "int32"}
+            assert found == {event: extra for event, (extra, _) in events.items()}
 
 
 STAGES = {

@@ -99,6 +99,7 @@ def chain(runs: tuple[Run, ...], code: dict[int, Block], factor: float) -> Price
 
 
 def event_prices(
+    kernel: str,
     code: dict[int, Block],
     runs: Events,
     chains: Events,
@@ -111,6 +112,8 @@ def event_prices(
 
     Parameters
     ----------
+    kernel : str
+        Also the name of the cells that its numbers were fitted to, in the table ``fits`` of the file.
     code : dict
         Basic blocks by address.
     runs, chains : dict
@@ -136,6 +139,7 @@ def event_prices(
             price["lanes"] = named.get(event) or round(lanes, 2)
         if extra:
             price |= {"provenance": "fitted", "source": f"{extra:.4g} of int32, experiments.silicon.leave_one_out"}
+            price |= {"fitted": {"int32": extra}, "fitted_to": kernel}
         out[event] = price
     return out
 
@@ -144,7 +148,7 @@ def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
     """Prices of all events of one kernel."""
     fitted = FITTED.get(kernel, {})
     out = event_prices(
-        code, RUNS[kernel], CHAINS[kernel], LANES[kernel], PASSED[kernel], fitted, CHAIN_FACTOR.get(kernel, {})
+        kernel, code, RUNS[kernel], CHAINS[kernel], LANES[kernel], PASSED[kernel], fitted, CHAIN_FACTOR.get(kernel, {})
     )
     for (of, event), loads in OWN_LOADS.items():
         if of == kernel:
@@ -158,9 +162,16 @@ def table(kernel: str, registers: int, source: str, found: dict[str, Price]) -> 
     """One kernel as TOML, an event a line."""
     lines = [f"[{kernel}]", f"registers = {registers}", 'provenance = "disassembled"', f'source = "{source}"']
     for event, price in found.items():
-        entries = [f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.5g}" for k, v in price.items()]
+        entries = [f"{name} = {_text(value)}" for name, value in price.items()]
         lines.append(f"{event} = {{ {', '.join(entries)} }}")
     return "\n".join(lines) + "\n"
+
+
+def _text(value: str | float | dict[str, float]) -> str:
+    """A value as TOML."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{name} = {_text(part)}' for name, part in value.items())} }}"
+    return f'"{value}"' if isinstance(value, str) else f"{value:.5g}"
 
 
 def main(listing: Path) -> str:

@@ -95,12 +95,14 @@ def prices(kernel: str, code: dict[int, Block]) -> dict[str, Price]:
     """Prices of all events of one kernel."""
     begins = {e: tuple(r._replace(times=_BEGINS[e]) for r in RUNS[kernel][e]) for e in _BEGINS}
     fitted, factors = FITTED.get(kernel, {}), CHAIN_FACTOR.get(kernel, {})
-    out = cudaraster_mix.event_prices(code, RUNS[kernel], CHAINS[kernel] | begins, LANES, {"atomic"}, fitted, factors)
+    out = cudaraster_mix.event_prices(
+        kernel, code, RUNS[kernel], CHAINS[kernel] | begins, LANES, {"atomic"}, fitted, factors
+    )
     for event, count in DERIVED[kernel].items():
         price = out.setdefault(event, {"lanes": 1.0})
         price["control"] = price.get("control", 0.0) + count
     about = {"provenance": "fitted", "source": "times of freepipe.csv: the SM's own requests in front"}
-    out["ATOMIC_REQUESTS"] = {"chain_alu": QUEUED[kernel]} | about
+    out["ATOMIC_REQUESTS"] = {"chain_alu": QUEUED[kernel]} | about | {"fitted_to": kernel}
     return out
 
 

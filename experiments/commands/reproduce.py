@@ -12,7 +12,8 @@ from tilestamp.experiments.commands.terminal import print_table, progress
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
 from tilestamp.experiments.harness.registry import experiment_names, select
 from tilestamp.experiments.harness.result import Outcome, Result
-from tilestamp.experiments.harness.write import COLUMNS, cell_texts, write_index
+from tilestamp.experiments.harness.texts import COLUMNS, PRINTED, averages, cell_texts, fitted_numbers
+from tilestamp.experiments.harness.write import write_index
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
@@ -91,15 +92,11 @@ def _print_result(result: Result) -> None:
         sys.stdout.write(f"! {warning}\n")
     title = f"{result.title} [{result.name}]"
     if result.cells:
-        rows = [cell_texts(cell) for cell in result.cells]
+        rows = [cell_texts(cell)[:PRINTED] for cell in result.cells]
         styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
-        print_table(title, COLUMNS, rows, styles)
+        print_table(title, COLUMNS[:PRINTED], rows, styles)
     else:
         sys.stdout.write(f"{title}\n")
-    errors = result.predicted_errors
-    if errors:
-        mean, worst = 100 * sum(errors) / len(errors), 100 * max(errors)
-        sys.stdout.write(f"{len(errors)} predicted cells: mean absolute error {mean:.1f} %, worst {worst:.1f} %\n")
-    for note in result.notes:
-        sys.stdout.write(f"- {note}\n")
+    sys.stdout.writelines(f"{sentence}\n" for sentence in averages(result))
+    sys.stdout.writelines(f"- {note}\n" for note in (*fitted_numbers(result), *result.notes))
     sys.stdout.flush()  # as they come, into a file too

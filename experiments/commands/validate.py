@@ -42,9 +42,9 @@ def validate(
         else:
             if not is_folder(measurements):
                 raise TilestampError(f"{measurements} is not a folder of measurements")
-            from tilestamp.experiments.validation.stored import compare
+            from tilestamp.experiments.validation.stored import compare, executions
 
-            table, remarks = compare(measurements, model, say), []
+            table, remarks = compare(measurements, executions(measurements, model, say)), []
     if output is not None:
         with writing(output):
             table.to_csv(output, index=False)

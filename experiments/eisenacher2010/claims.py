@@ -2,7 +2,14 @@
 
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stage_ms, stand_in_warnings
+from tilestamp.experiments.eisenacher2010.frames import (
+    KILLEROO,
+    SOURCE,
+    frame,
+    overhead_ms,
+    stage_ms,
+    stand_in_warnings,
+)
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
 
@@ -26,12 +33,12 @@ def run(progress: Progress) -> Result:
     ste, ste_all = (float(r.stages.loc["tile_raster", "ste"]) for r in (tested, untested))
     computed_ms, loaded_ms = (stage_ms(r, "dice", "tile_raster") for r in (tested, loaded))
     cells = [
-        Cell("box tests", "share of total time saved", "", published=BOX_TEST_SAVING, ours=saving, status="fitted"),
+        Cell("box tests", "share of total time saved", "", published=BOX_TEST_SAVING, ours=saving, frame=KILLEROO),
         Cell(
             "8x8 stamp, every lane of every quad", "STE", "", published=THEORETICAL_STE, ours=ste_all, status="reported"
         ),
         Cell("8x8 stamp, warps that evaluate edges", "STE", "", published=None, ours=ste, status="reported"),
-        Cell("bound and split", "patches a second", "1/s", published=PATCHES_PER_SECOND, ours=rate, status="fitted"),
+        Cell("bound and split", "patches a second", "1/s", published=PATCHES_PER_SECOND, ours=rate, frame=KILLEROO),
         Cell(
             "edges loaded, not computed",
             "dice and tile raster",
@@ -77,8 +84,7 @@ def _notes(ste: float, ratio: float, made: "Run") -> list[str]:
             "set-up is a small part of what a quad costs once box tests have turned most lanes away."
         ),
         (
-            "The saving of the box tests is fitted: the instructions of an edge set-up were chosen on it (36 of "
-            "them, where PTX "
+            "To the saving of the box tests the instructions of an edge set-up were fitted (36 of them, where PTX "
             "of our own kernel needs 8)."
         ),
     ]

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
+from tilestamp.experiments.eisenacher2010.frames import KILLEROO, SOURCE, frame, overhead_ms, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
@@ -25,7 +25,7 @@ def run(progress: Progress) -> Result:
     for zoom in ZOOMS:
         for tile in TILES:
             progress(f"eisenacher2010/figure4: zoom {zoom}, tiles of {tile}")
-            made = frame(tile=tile, view=f"zoom{zoom}")
+            made = frame(tile=tile, view="default" if zoom == ZOOMS[0] else f"zoom{zoom}")
             raster = made.stages.loc["tile_raster"]
             rows.append(
                 {
@@ -55,7 +55,15 @@ def run(progress: Progress) -> Result:
 def _cells(table: "pd.DataFrame") -> list[Cell]:
     """The order at each zoom level, and the times that make it."""
     times = [
-        Cell(f"zoom {row.zoom}", f"{row.tile} tiles", "ms", published=None, ours=row.ms, status="reported")
+        Cell(
+            f"zoom {row.zoom}",
+            f"{row.tile} tiles",
+            "ms",
+            published=None,
+            ours=row.ms,
+            status="reported",
+            frame=_frame(row.zoom),
+        )
         for row in table.itertuples()
     ]
     return [*(_order(table, zoom) for zoom in ZOOMS), *times]
@@ -64,7 +72,14 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
 def _order(table: "pd.DataFrame", zoom: int) -> Cell:
     """Tile sizes in the order of their times."""
     times = table[table["zoom"] == zoom].sort_values("ms")
-    return Cell(f"zoom {zoom}", "order in time", "", published=PUBLISHED_ORDER, ours=" < ".join(times["tile"]))
+    made_of = tuple((f"zoom {zoom}", f"{tile} tiles") for tile in times["tile"])
+    ours = " < ".join(times["tile"])
+    return Cell(f"zoom {zoom}", "order in time", "", published=PUBLISHED_ORDER, ours=ours, of=made_of)
+
+
+def _frame(zoom: int) -> str:
+    """The first level is the view of the other tables."""
+    return KILLEROO if zoom == ZOOMS[0] else KILLEROO.replace(" ", f" zoom{zoom} ")
 
 
 def _notes(table: "pd.DataFrame") -> list[str]:

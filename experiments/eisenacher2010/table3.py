@@ -4,7 +4,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.eisenacher2010.frames import (
-    OVERHEAD_MS,
+    KILLEROO,
+    OVERHEAD,
     SOURCE,
     frame,
     overhead_ms,
@@ -12,7 +13,7 @@ from tilestamp.experiments.eisenacher2010.frames import (
     stand_in_warnings,
 )
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.plots import stacked_bars
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 from tilestamp.simulator.work import Work
@@ -28,7 +29,7 @@ DICE_MS, COUNT_MS, SORT_MS, SETUP_MS = 6.0, 2.5, 0.3, 8.2
 SAMPLING_MS = {1: 46.2, 4: 110.6, 16: 261.4}
 TOTAL_MS = {1: 77.0, 4: 140.6, 16: 290.2}
 HYBRID_SAMPLING_MS, HYBRID_TOTAL_MS = 19.0, 37.2
-FITTED_SPP = 16  # the instructions of a sub-tile test (simulator/mixes/micropolygon/cc1.toml) were chosen on this cell
+STAGES = ("system overhead", "bound and split", "evaluate grid", "count", "sort", "setup")  # the same at any spp
 STARTED = (E.PIXEL_WARPS, E.PIXEL_LANES, E.GRIDS, E.BATCHES, E.BATCH_WARPS, E.GATHER_WARPS, E.GATHER_LANES)
 MOVED = (E.BARRIERS, E.LOAD_TRANSACTIONS, E.LOAD_BYTES, E.STORE_TRANSACTIONS, E.STORE_BYTES)
 
@@ -45,7 +46,7 @@ def run(progress: Progress) -> Result:
     progress("eisenacher2010/table3: hybrid")
     hybrid = frame(hybrid=True)
     stages["hybrid"] = {
-        "overhead": OVERHEAD_MS,
+        "overhead": overhead_ms(hybrid),
         **{stage: stage_ms(hybrid, stage) for stage in ("bound_and_split", "dice", "hardware")},
     }
     cells += _hybrid_cells(stages["hybrid"], sum(stages["1 spp"].values()))
@@ -57,13 +58,9 @@ def run(progress: Progress) -> Result:
         figures=[Figure("stages", lambda path: _draw(stages, path))],
         notes=[
             (
-                "Fitted, one number each: bound and split (the oracle's instructions: theirs is not published), "
-                "setup (block "
-                "launch rate: setup is taken to be the start of 30,000 blocks, of which most are empty), sampling "
-                "at 16 spp "
-                "(instructions of a sub-tile test), hardware (primitives a clock). Instructions of an edge set-up "
-                "are fitted to the "
-                "saving of the box tests (experiment claims)."
+                "Fitted numbers stand for what is not published: the oracle's instructions (bound and split), the "
+                "block launch rate (setup is taken to be the start of 30,000 blocks, of which most are empty), the "
+                "instructions of a sub-tile test and of an edge set-up (sampling), primitives a clock (hardware)."
             ),
             "Setup is the tile raster without its quads; sampling is the rest.",
             (
@@ -101,67 +98,46 @@ def setup_ms(made: "Run") -> float:
 def _software_cells(spp: int, ours: dict[str, float]) -> list[Cell]:
     """Cells of one column; the stages above sampling are printed once, under 1 spp."""
     column = f"{spp} spp"
-    cells = []
-    if spp == 1:
-        cells = [
-            Cell("system overhead", column, "ms", published=OVERHEAD_MS, ours=ours["overhead"], status="fitted"),
-            Cell(
-                "bound and split",
-                column,
-                "ms",
-                published=SPLIT_MS,
-                ours=ours["bound_and_split"],
-                status="fitted",
-                aim=STAGE_AIM,
-            ),
-            Cell(
-                "evaluate grid", column, "ms", published=DICE_MS, ours=ours["dice"], status="predicted", aim=STAGE_AIM
-            ),
-            Cell("count", column, "ms", published=COUNT_MS, ours=ours["count"], status="predicted", aim=STAGE_AIM),
-            Cell("sort", column, "ms", published=SORT_MS, ours=ours["sort"], status="predicted", aim=STAGE_AIM),
-            Cell("setup", column, "ms", published=SETUP_MS, ours=ours["setup"], status="fitted", aim=STAGE_AIM),
-        ]
-    status: Status = "fitted" if spp == FITTED_SPP else "predicted"
-    cells.append(
-        Cell("sampling", column, "ms", published=SAMPLING_MS[spp], ours=ours["sampling"], status=status, aim=STAGE_AIM)
-    )
-    cells.append(
-        Cell("total", column, "ms", published=TOTAL_MS[spp], ours=sum(ours.values()), status=status, aim=TOTAL_AIM)
-    )
-    return cells
+    asked = (OVERHEAD.number, SPLIT_MS, DICE_MS, COUNT_MS, SORT_MS, SETUP_MS)
+    stages = zip(STAGES, asked, ours.values(), strict=False)  # of ours sampling is left
+    cells = [_cell(row, column, ms, mine) for row, ms, mine in stages] if spp == 1 else []
+    made_of = (*((row, "1 spp") for row in STAGES), ("sampling", column))
+    return [
+        *cells,
+        _cell("sampling", column, SAMPLING_MS[spp], ours["sampling"]),
+        _cell("total", column, TOTAL_MS[spp], sum(ours.values()), TOTAL_AIM, made_of),
+    ]
+
+
+def _cell(
+    row: str, column: str, asked: float, ours: float, aim: float = STAGE_AIM, of: tuple[tuple[str, str], ...] = ()
+) -> Cell:
+    return Cell(row, column, "ms", published=asked, ours=ours, aim=aim, frame=KILLEROO, of=of)
 
 
 def _hybrid_cells(ours: dict[str, float], software_ms: float) -> list[Cell]:
+    """Cells of the hybrid; its first two stages are those of the software."""
     total = sum(ours.values())
+    made_of = (
+        ("system overhead", "1 spp"),
+        *((row, "hybrid") for row in ("bound and split", "evaluate grid", "sampling")),
+    )
     return [
-        Cell(
-            "bound and split",
-            "hybrid",
-            "ms",
-            published=HYBRID_SPLIT_MS,
-            ours=ours["bound_and_split"],
-            status="predicted",
-            aim=STAGE_AIM,
+        _cell(
+            "bound and split", "hybrid", HYBRID_SPLIT_MS, ours["bound_and_split"], of=(("bound and split", "1 spp"),)
         ),
-        Cell("evaluate grid", "hybrid", "ms", published=DICE_MS, ours=ours["dice"], status="predicted", aim=STAGE_AIM),
-        Cell(
-            "sampling",
-            "hybrid",
-            "ms",
-            published=HYBRID_SAMPLING_MS,
-            ours=ours["hardware"],
-            status="fitted",
-            aim=STAGE_AIM,
-        ),
-        Cell("total", "hybrid", "ms", published=HYBRID_TOTAL_MS, ours=total, status="predicted", aim=TOTAL_AIM),
+        _cell("evaluate grid", "hybrid", DICE_MS, ours["dice"], of=(("evaluate grid", "1 spp"),)),
+        _cell("sampling", "hybrid", HYBRID_SAMPLING_MS, ours["hardware"]),
+        _cell("total", "hybrid", HYBRID_TOTAL_MS, total, TOTAL_AIM, made_of),
         Cell(
             "frames a second",
             "software : hybrid",
             "",
             published=0.48,
             ours=total / software_ms,
-            status="predicted",
             aim=TOTAL_AIM,
+            frame=KILLEROO,
+            of=(("total", "hybrid"), ("total", "1 spp")),
         ),
     ]
 

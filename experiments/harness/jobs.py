@@ -20,11 +20,11 @@ from tempfile import TemporaryDirectory
 from threading import Thread
 from typing import Any
 
+from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
-from tilestamp.experiments.harness.result import Outcome, Result
+from tilestamp.experiments.harness.result import Figure, Outcome, Result
 from tilestamp.experiments.harness.write import SCRATCH, write_result
 from tilestamp.models.errors import MissingInputError, TilestampError
-from tilestamp.models.used import collect
 
 LONGEST = 4096  # bytes of one line of progress
 
@@ -94,9 +94,9 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
     try:
         say(name)
         try:
-            with collect() as used:
-                result = load_experiment(name)(say)
+            result, used = run_judged(load_experiment(name), say)
         except MissingInputError as missing:
+            used = {}
             result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
         write_result(result, output, options, used)
     except TilestampError as error:
@@ -104,7 +104,7 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
     except Exception as error:  # noqa: BLE001 - one experiment's fault ends no other
         place = traceback.extract_tb(error.__traceback__)[-1]
         return Outcome(name, failure=f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
-    return Outcome(name, replace(result, figures=[replace(figure, draw=_drawn) for figure in result.figures]))
+    return Outcome(name, replace(result, figures=[Figure(figure.name, _drawn) for figure in result.figures]))
 
 
 def _drawn(_path: Path) -> None:

@@ -1,15 +1,17 @@
 """The answer to one question: published cells beside ours, figures, notes."""
 
+import math
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     import pandas as pd
 
-Status = Literal["predicted", "fitted", "reported"]
+Status = Literal["predicted", "partly fitted", "fitted", "reproduced", "reported"]
+TIME_UNITS = ("s", "ms", "us", "ns")
 
 
 @dataclass(frozen=True)
@@ -23,10 +25,19 @@ class Cell:
     published : float, str or None
         As printed; an order or a name where that is what the source says; None where it says nothing.
     ours : float or str
-    status : {"predicted", "fitted", "reported"}
-        ``fitted``: a parameter was chosen on this cell, so its error says nothing; ``reported``: there is no aim.
+    status : {"predicted", "partly fitted", "fitted", "reproduced", "reported"}
+        An experiment says that there is no aim (``reported``) or that what is published was computed like ours and not
+        measured (``reproduced``). How fitted any other cell is, is computed (``tilestamp.experiments.harness.fit``).
     aim : float or None
         Relative error aimed at.
+    frame : str
+        Scene, view and size that it was drawn at, as fitted numbers name theirs (``killeroo 1600x1200``).
+    of : tuple of (row, column)
+        Cells of the same table that this one is made of: where an error of theirs is averaged, this one's is not again.
+    share : float
+        Of a change of the fitted numbers of its frame, the part that it follows.
+    fitted_by : tuple of (str, float)
+        The numbers, with the part of each.
     """
 
     row: str
@@ -37,22 +48,39 @@ class Cell:
     ours: float | str
     status: Status = "predicted"
     aim: float | None = None
+    frame: str = ""
+    of: tuple[tuple[str, str], ...] = ()
+    share: float = 0.0
+    fitted_by: tuple[tuple[str, float], ...] = ()
 
     @property
     def error(self) -> float | None:
-        """Relative error, None where there is no number to compare with."""
+        """Relative error, None where there are no two numbers to compare, or none to divide by."""
         if isinstance(self.published, str) or isinstance(self.ours, str) or not self.published:
             return None
-        return self.ours / self.published - 1.0
+        error = self.ours / self.published - 1.0
+        return error if math.isfinite(error) else None
 
     @property
     def missed(self) -> bool:
-        """Whether a predicted cell lies outside its aim, or names something else than the source."""
-        if self.status != "predicted":
+        """Whether a cell that is not fitted lies outside its aim, or is something else than the source names."""
+        if self.status in {"fitted", "reported"} or self.published is None or _nothing(self.published):
             return False
-        if isinstance(self.published, str):
+        if isinstance(self.published, str) or isinstance(self.ours, str) or not math.isfinite(self.ours):
             return self.published != self.ours
-        return self.aim is not None and abs(self.error or 0.0) > self.aim
+        if self.published == 0:
+            return self.aim is not None and self.ours != 0
+        return self.aim is not None and abs(self.ours / self.published - 1.0) > self.aim
+
+    @property
+    def is_time(self) -> bool:
+        """Whether it is in units of time; what else there is, are counts and shares."""
+        return self.unit.partition("/")[0].partition(",")[0] in TIME_UNITS
+
+
+def _nothing(published: float | str) -> bool:
+    """Whether a table read from a file has no number here."""
+    return isinstance(published, float) and math.isnan(published)
 
 
 @dataclass(frozen=True)
@@ -63,6 +91,14 @@ class Figure:
     draw: "Callable[[Path], None]"
 
 
+@dataclass(frozen=True)
+class CellFigure:
+    """A plot of the cells, which are known when all of the result is: how fitted each is, too."""
+
+    name: str
+    draw: "Callable[[Sequence[Cell], Path], None]"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Result:
     """What one experiment found."""
@@ -71,15 +107,21 @@ class Result:
     title: str
     source: str
     cells: list[Cell]
-    figures: list[Figure] = field(default_factory=list)
+    figures: "Sequence[Figure | CellFigure]" = ()
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)  # stand-ins and the like: shown above the table
     tables: dict[str, "pd.DataFrame"] = field(default_factory=dict)  # further tidy tables, written as CSV
 
+    def errors(self, status: Status, *, times: bool) -> list[float]:
+        """Absolute relative errors of the cells of one kind, times or all else, but of cells made of others of them."""
+        chosen = {(c.row, c.column) for c in self.cells if c.status == status and c.error is not None}
+        once = (c for c in self.cells if c.status == status and not chosen.intersection(c.of))
+        return [abs(c.error) for c in once if c.error is not None and c.is_time == times]
+
     @property
     def predicted_errors(self) -> list[float]:
-        """Absolute relative errors of the predicted cells: the only ones that are ever averaged."""
-        return [abs(c.error) for c in self.cells if c.status == "predicted" and c.error is not None]
+        """Absolute relative errors of the predicted cells: the only ones that speak of the model."""
+        return self.errors("predicted", times=True) + self.errors("predicted", times=False)
 
 
 @dataclass(frozen=True)

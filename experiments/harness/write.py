@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import tilestamp
 from tilestamp.experiments.harness.registry import describe_folder
-from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.result import Cell, CellFigure, Figure, Result
+from tilestamp.experiments.harness.texts import COLUMNS, averages, cell_texts, fitted_by, number
 from tilestamp.models.used import Used
 from tilestamp.reports.page import write_page
 from tilestamp.simulator.manifest import software, source_digest, used_manifest
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 SCRATCH = ".partial-"  # first letters of a folder that is being written
 BOUNDARIES = "boundaries"  # a table of results of the stability atlas
-COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim")
 
 
 def write_result(result: Result, folder: Path, options: dict[str, Any], used: Used | None = None) -> Path:
@@ -52,11 +52,19 @@ def write_result(result: Result, folder: Path, options: dict[str, Any], used: Us
         for name, table in result.tables.items():
             table.to_csv(made / f"{name}.csv", index=False)
         for figure in result.figures:
-            figure.draw(made / f"{figure.name}.png")
+            draw_figure(figure, result, made / f"{figure.name}.png")
         (made / "manifest.json").write_text(json.dumps(_manifest(result, options, used or {}), indent=1) + "\n")
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)
     return target
+
+
+def draw_figure(figure: Figure | CellFigure, result: Result, path: Path) -> None:
+    """Draw a figure of a result to a file."""
+    if isinstance(figure, CellFigure):
+        figure.draw(result.cells, path)
+    else:
+        figure.draw(path)
 
 
 def _group(result: Result) -> str:
@@ -71,7 +79,7 @@ def result_folder(result: Result) -> str:
 
 def _record(cell: Cell) -> dict[str, Any]:
     """A cell as a tidy row."""
-    return {name: getattr(cell, name) for name in COLUMNS}
+    return {name: getattr(cell, name) for name in COLUMNS[:-1]} | {COLUMNS[-1]: fitted_by(cell)}
 
 
 def _manifest(result: Result, options: dict[str, Any], used: Used) -> dict[str, Any]:
@@ -90,8 +98,11 @@ def write_index(results: Sequence[Result], folder: Path) -> Path:
     """Write the page over all results."""
     path = folder / "index.html"
     introduction = (
-        "Published cells beside what tilestamp computes. A fitted cell had a parameter chosen on it, so its error says "
-        "nothing and is never averaged; a predicted one had none. Red: outside the aim."
+        "Published cells beside what tilestamp computes. How fitted a cell is, is computed: each number that was "
+        "fitted on its frame is changed by 1 %, and share is the part of that change that the cell follows. Predicted: "
+        "at most 10 %; fitted: at least 90 %, or a number was chosen on this very cell: its error says nothing; "
+        "reproduced: published by a computation like ours, not measured. Only errors of predicted cells speak of the "
+        "model. Red: outside the aim."
     )
     footer = f"tilestamp {tilestamp.__version__}, sources {source_digest()}"
     sections = [_section(result) for result in results]
@@ -138,7 +149,7 @@ def _overview(group: str, table: "pd.DataFrame") -> dict[str, Any]:
 
 def _end(value: float | None) -> str:
     """A value that holds, or one that breaks."""
-    return "none tried" if value is None or value != value else _number(value)  # noqa: PLR0124 - not-a-number
+    return "none tried" if value is None or value != value else number(value)  # noqa: PLR0124 - not-a-number
 
 
 def _section(result: Result) -> dict[str, Any]:
@@ -150,28 +161,13 @@ def _section(result: Result) -> dict[str, Any]:
         "title": result.title,
         "source": result.source,
         "warnings": result.warnings,
+        "averages": averages(result),
         "notes": result.notes,
         "columns": COLUMNS,
         "error_column": COLUMNS.index("error"),
         "rows": [
-            {"cells": cell_texts(cell), "marks": f"{cell.status} {'missed' if cell.missed else ''}"}
+            {"cells": cell_texts(cell), "marks": f"{cell.status.split()[-1]} {'missed' if cell.missed else ''}"}
             for cell in result.cells
         ],
         "figures": [f"{result_folder(result)}/{figure.name}.png" for figure in result.figures],
     }
-
-
-def cell_texts(cell: Cell) -> tuple[str, ...]:
-    """A cell as the texts of its columns."""
-    error = "" if cell.error is None else f"{100 * cell.error:+.1f} %"
-    aim = "" if cell.aim is None else f"{100 * cell.aim:.0f} %"
-    if isinstance(cell.published, str):
-        error = "as published" if cell.published == cell.ours else "differs"
-    return (cell.row, cell.column, cell.unit, _number(cell.published), _number(cell.ours), error, cell.status, aim)
-
-
-def _number(value: float | str | None) -> str:
-    """A value as text: four digits, thousands apart."""
-    if value is None or isinstance(value, str):
-        return value or ""
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"

@@ -1,11 +1,12 @@
 """Slides: memory of setup data and queues, five scenes (Laine & Karras 2011)."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
-from tilestamp.experiments.laine2011.generated import draw, scenes, statistics, warning
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.laine2011.generated import draw, frame_name, scenes, statistics, warning
 from tilestamp.experiments.laine2011.sweep import SOURCE
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 
 SETUP_AIM, QUEUE_FACTOR = 0.05, 1.5
 WIDTH, HEIGHT = 1024, 768  # assumed: the slides do not say
-DERIVED = ("sanmiguel", "juarez")  # their triangle counts were taken from this very table
-FITTED_QUEUE = ("buddha", "bin queues")  # generated.DISORDER was chosen on it
 QUEUES = {"bin queues": "bin_queues_MB", "tile queues": "tile_queues_MB"}
 
 
@@ -28,7 +27,6 @@ def run(progress: Progress) -> Result:
     for scene in statistics():
         row = table.loc[scene.name]
         setup = scene.triangles * SUBTRIANGLE_BYTES["1.1"] / 2**20
-        status: Status = "fitted" if scene.name in DERIVED else "predicted"
         cells.append(
             Cell(
                 scene.name,
@@ -36,8 +34,8 @@ def run(progress: Progress) -> Result:
                 "MB",
                 published=float(row["triangle_setup_MB"]),
                 ours=setup,
-                status=status,
                 aim=SETUP_AIM,
+                frame=frame_name(scene.name, WIDTH, HEIGHT),
             )
         )
         if scene.name in drawn:
@@ -51,10 +49,8 @@ def run(progress: Progress) -> Result:
         title="Slides: memory in use, CudaRaster, 1024x768",
         source=SOURCE,
         cells=cells,
-        figures=[Figure("memory", lambda path: _draw(cells, path))],
+        figures=[CellFigure("memory", _draw)],
         notes=[
-            "The triangles of San Miguel and Juarez were derived from their setup data, so those two cells are fitted.",
-            "How far generated triangles are out of order was chosen on the bin queues of Buddha alone.",
             (
                 f"Queues: aim a factor {QUEUE_FACTOR}. The release has 16 bin streams, the slides speak of 15, one an "
                 "SM; each stream of each bin keeps an open segment of 2 KB at the end of each batch."
@@ -67,11 +63,10 @@ def run(progress: Progress) -> Result:
 def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:
     """One queue; its aim is a factor, so that too little is judged like too much."""
     aim = QUEUE_FACTOR - 1.0 if ours > asked else 1.0 - 1.0 / QUEUE_FACTOR
-    status: Status = "fitted" if (scene, queue) == FITTED_QUEUE else "predicted"
-    return Cell(scene, queue, "MB", published=asked, ours=ours, status=status, aim=aim)
+    return Cell(scene, queue, "MB", published=asked, ours=ours, aim=aim, frame=frame_name(scene, WIDTH, HEIGHT))
 
 
-def _draw(cells: list[Cell], path: "Path") -> None:
+def _draw(cells: Sequence[Cell], path: "Path") -> None:
     import pandas as pd
 
     rows = [

@@ -7,8 +7,9 @@ import numpy as np
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.fitted import on_frame
 from tilestamp.models.machine import load_machine
-from tilestamp.models.used import remembered
+from tilestamp.models.remembered import remembered
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import origin_of
@@ -22,7 +23,6 @@ MACHINE = "gtx480"
 WIDTH, HEIGHT = 1024, 768
 STAGES = {"triangle_setup": "setup", "bin_raster": "bin", "coarse_raster": "coarse", "fine_raster": "fine"}
 PUBLISHED_AREAS = tuple(tick / 4 for tick in range(161))
-FITTED_AREAS = (0.0, 0.25, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 40.0)  # simulator/mixes/cudaraster/cc2.toml
 DEFAULT_AREAS = (0.0, 0.5, 1.0, 4.0, 8.0, 16.0, 40.0)
 VARIABLE = "TILESTAMP_SWEEP"  # "all" for the 161 published areas, or areas: "0.5,3,17"
 
@@ -69,6 +69,24 @@ def draw(area: float, name: str = MACHINE) -> tuple[Run, int]:
 def nanoseconds(run: Run, triangles: int) -> dict[str, float]:
     """Time of each stage for one triangle."""
     return {stage: float(run.stages.loc[stage, "milliseconds"]) * 1e6 / triangles for stage in STAGES}
+
+
+def frame_name(area: float) -> str:
+    """The frame of an area, as fitted numbers name it."""
+    return f"sweep {area:g} px {WIDTH}x{HEIGHT}"
+
+
+@cache
+def fitted_areas() -> tuple[float, ...]:
+    """Areas that numbers of the mix were fitted on."""
+    from tilestamp.simulator.mix import load_mix
+
+    numbers = [number for kernel in load_mix("cudaraster", "2.0").kernels.values() for number in kernel.fitted.values()]
+    return tuple(
+        area
+        for area in PUBLISHED_AREAS
+        if any(on_frame(target, frame_name(area)) for number in numbers for target in number.fitted_to)
+    )
 
 
 def fitted_entries() -> int:

@@ -1,5 +1,6 @@
 """Table 3: stage times, memory and the profiler's counters, Buddha, first camera, GTX 480 (Laine & Karras 2011)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,7 +9,7 @@ import numpy as np
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.scenes import Scene, load_scene
@@ -62,7 +63,7 @@ def run(progress: Progress) -> Result:
         title=f"Table 3: {name}, camera 0, 1024x768, GTX 480",
         source=SOURCE,
         cells=cells,
-        figures=[Figure("counters", lambda path: _draw(cells, path))],
+        figures=[CellFigure("counters", _draw)],
         notes=notes,
         warnings=[] if name == FULL else [reduced_warning()],
     )
@@ -153,7 +154,7 @@ def counter_cells(made: "Run", status: Status) -> list[Cell]:
     return cells
 
 
-def _draw(cells: list[Cell], path: Path) -> None:
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     import pandas as pd
 
     rows = [

@@ -1,21 +1,21 @@
 """Ru 2016, tiles against primitives: eight models, tiled with and without culling, and per primitive."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
 from tilestamp.experiments.ru2016.setting import (
     DEGREE_VIEW,
-    INTEROP_MS,
+    INTEROP,
     MODELS_TILE,
     RADIAN_VIEW,
-    SHARE_OF_WINDOW,
     SOURCE,
     draw,
     frame_ms,
+    frame_name,
     missing,
     published,
     waits_ms,
@@ -31,12 +31,6 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "per_primitive_ms": ("per-primitive", {}),
 }
 AIM = 0.5
-FITTED = {
-    ("triangle", "tile_ms"),  # the host's time to map the window's buffer
-    ("triangle", "tile_without_culling_ms"),  # the same frame
-    ("2CylinderEngine", "tile_ms"),  # the cost of a wait: this is his 16x16 cell of tile_size
-    *((name, "per_primitive_ms") for name in SHARE_OF_WINDOW),  # their size on the screen
-}
 TIE = 0.05  # published times as near as this have no winner
 VIEWED = ("triangle", "box", "CesiumMilkTruck", "flower")  # also drawn with 45 degrees
 
@@ -53,7 +47,7 @@ def run(progress: Callable[[str], None]) -> Result:
     cells = [
         Cell(
             name, column.removesuffix("_ms"), "ms", published=float(table[column][name]), ours=frame_ms(frame),
-            status="fitted" if (name, column) in FITTED else "predicted", aim=AIM,
+            aim=AIM, frame=frame_name(name),
         )
         for name, frames in runs.items()
         for column, frame in frames.items()
@@ -67,7 +61,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Tiles against primitives",
         source=SOURCE,
         cells=cells,
-        figures=_figures(cells),
+        figures=[CellFigure("times", _draw)],
         notes=notes,
         warnings=missing(absent),
         tables=tables,
@@ -79,8 +73,9 @@ def _winner(name: str, asked: "pd.Series[float]", frames: dict[str, Run]) -> Cel
     tie = abs(asked["tile_ms"] / asked["per_primitive_ms"] - 1.0) < TIE
     his = "tie" if tie else "tiles" if asked["tile_ms"] < asked["per_primitive_ms"] else "primitives"
     ours = "tiles" if frame_ms(frames["tile_ms"]) < frame_ms(frames["per_primitive_ms"]) else "primitives"
-    status: Status = "reported" if tie else "fitted" if name in SHARE_OF_WINDOW else "predicted"
-    return Cell(name, "faster", "", published=his, ours=ours, status=status)
+    status: Status = "reported" if tie else "predicted"
+    made_of = ((name, "tile"), (name, "per_primitive"))
+    return Cell(name, "faster", "", published=his, ours=ours, status=status, frame=frame_name(name), of=made_of)
 
 
 def _notes(runs: dict[str, dict[str, Run]], breakdown: pd.DataFrame) -> list[str]:
@@ -94,10 +89,6 @@ def _notes(runs: dict[str, dict[str, Run]], breakdown: pd.DataFrame) -> list[str
             f"The floor of 5.3 ms, on one triangle, in ms: {listed}. Most of the kernels' time is the raster writing "
             f"empty fragments: 56-byte structures stored word by word, {stores.store_transactions / 1e6:.1f} million "
             "segments. Per primitive there is no such store, but fragments and depth are cleared."
-        ),
-        (
-            f"Fitted: {INTEROP_MS:g} ms of the host (one triangle, tiles); the wait after a launch (engine, tiles); "
-            "how large engine and di stand on the screen (per primitive)."
         ),
         (
             f"Hypotheses: 45 taken as radians, {RADIAN_VIEW:.1f} degrees; 16x16 tiles; models not turned. He turned "
@@ -133,7 +124,7 @@ def _breakdown(runs: dict[str, dict[str, Run]]) -> pd.DataFrame:
             "method": column.removesuffix("_ms"),
             "frame_ms": frame_ms(frame),
             "waits_ms": waits_ms(frame),
-            "interop_ms": INTEROP_MS,
+            "interop_ms": INTEROP.value,
             **{f"{stage}_ms": float(ms) for stage, ms in frame.stages.milliseconds.items()},
         }
         for name, frames in runs.items()
@@ -154,7 +145,7 @@ def _views() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _figures(cells: list[Cell]) -> list[Figure]:
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     """Draw ours beside his."""
     bars = pd.DataFrame(
         [
@@ -168,11 +159,7 @@ def _figures(cells: list[Cell]) -> list[Figure]:
             if c.unit == "ms"
         ]
     )
-
-    def times(path: Path) -> None:
-        paired_bars(
-            bars, path, label="cell", ours="ours", published="published", status="status",
-            title="Eight models, three ways (GT 750M)", y_label="ms",
-        )  # fmt: skip
-
-    return [Figure("times", times)]
+    paired_bars(
+        bars, path, label="cell", ours="ours", published="published", status="status",
+        title="Eight models, three ways (GT 750M)", y_label="ms",
+    )  # fmt: skip

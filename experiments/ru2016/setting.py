@@ -23,7 +23,9 @@ import numpy as np
 import pandas as pd
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.fitted import Fitted
 from tilestamp.models.price import Fidelity
+from tilestamp.models.remembered import remembered
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.camera import Camera, LookAt
 from tilestamp.simulator.scenes.library import load_scene
@@ -39,8 +41,20 @@ RADIAN_VIEW = math.degrees(2.0 * math.atan(abs(math.tan(45.0 / 2.0))))  # 45 tak
 DEGREE_VIEW = 45.0
 MODELS_TILE = 16  # pixels
 COW_SCALE = 0.09283  # course's cow.gltf (2018 copy): 0.9695 units long; cow.obj: 10.444
-SHARE_OF_WINDOW = {"2CylinderEngine": 0.65, "di": 0.05}  # fitted to their per-primitive times, in steps of 0.05
-INTEROP_MS = 2.13  # mapping the window's buffer and giving it back; fitted to one triangle's 5.3 ms
+SHARE_OF_WINDOW = {  # in steps of 0.05
+    name: Fitted(
+        f"ru2016: size of {name} on the screen",
+        share,
+        (f"{name} 800x800 | ru2016-models | {name} | per_primitive",),
+        chosen=True,
+    )
+    for name, share in (("2CylinderEngine", 0.65), ("di", 0.05))
+}
+INTEROP = Fitted(
+    "ru2016: milliseconds to map the window's buffer and give it back",
+    2.13,
+    ("triangle 800x800 | ru2016-models | triangle | tile or tile_without_culling",),
+)
 
 
 def published(name: str) -> pd.DataFrame:
@@ -62,7 +76,9 @@ def model(name: str) -> Scene:
         points = _mesh(scene).positions[:, :3].astype(np.float64)
         low, high = points.min(axis=0), points.max(axis=0)
         window = 2.0 * DISTANCE * math.tan(math.radians(RADIAN_VIEW) / 2.0)
-        return _scaled(scene, SHARE_OF_WINDOW[name] * window / (high - low)[:2].max(), (low + high) / 2.0)
+        return _scaled(
+            scene, SHARE_OF_WINDOW[name].on(frame_name(name)) * window / (high - low)[:2].max(), (low + high) / 2.0
+        )
     return scene
 
 
@@ -90,6 +106,12 @@ def camera(fov_degrees: float = RADIAN_VIEW) -> Camera:
     return LookAt((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), fov_degrees=fov_degrees, near=0.1, far=100.0)
 
 
+def frame_name(name: str) -> str:
+    """The frame of a model, as fitted numbers name it."""
+    return f"{name} {SIZE}x{SIZE}"
+
+
+@remembered
 def draw(
     name: str, pipeline: str, fidelity: Fidelity = "schedule", fov_degrees: float = RADIAN_VIEW, **options: Any
 ) -> Run | None:
@@ -105,13 +127,13 @@ def draw(
 
 def host_ms(run: Run) -> float:
     """Milliseconds in which the GPU stands idle: the host waits after launches, and maps the window's buffer."""
-    return waits_ms(run) + INTEROP_MS
+    return waits_ms(run) + INTEROP.value
 
 
 def waits_ms(run: Run) -> float:
     """Milliseconds of the launches that his host waits for, which the machine file prices."""
     waits = int(run.frame.facts["launches that the host waits for"])
-    return waits * run.machine.launch.sync_us / 1e3
+    return waits * run.machine.as_moved.launch.sync_us / 1e3
 
 
 def frame_ms(run: Run) -> float:

@@ -1,17 +1,18 @@
 """Ru 2016, performance against tile size: occupancy and time of the engine at tiles of 4, 8, 16, 32."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result
 from tilestamp.experiments.ru2016.setting import (
-    INTEROP_MS,
+    INTEROP,
     MACHINE,
     SOURCE,
     draw,
     frame_ms,
+    frame_name,
     missing,
     published,
     waits_ms,
@@ -25,7 +26,7 @@ SLOW = True  # with what it needs compiled, more than the first run should take
 
 REGISTERS = 63  # published
 MODEL = "2CylinderEngine"
-FITTED_TILE = 16  # what a launch that the host waits for costs, in the machine file
+PLACE = frame_name(MODEL)
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -41,7 +42,6 @@ def run(progress: Callable[[str], None]) -> Result:
     rows: list[Cell] = []
     asked = dict(zip(table.tile_size, table.ms, strict=True))
     for tile, frame in times.items():
-        status: Status = "fitted" if tile == FITTED_TILE else "predicted"
         rows.append(
             Cell(
                 f"{tile}x{tile}",
@@ -49,13 +49,14 @@ def run(progress: Callable[[str], None]) -> Result:
                 "ms",
                 published=float(asked[tile]),
                 ours=frame_ms(frame),
-                status=status,
                 aim=0.2,
+                frame=PLACE,
             )
         )
     if rows:
         order = " < ".join(str(tile) for tile in sorted(times, key=lambda tile: frame_ms(times[tile])))
-        cells.append(Cell("all", "order in time", "", published="8 < 4 < 16 < 32", ours=order))
+        made_of = tuple((cell.row, cell.column) for cell in rows)
+        cells.append(Cell("all", "order in time", "", published="8 < 4 < 16 < 32", ours=order, frame=PLACE, of=made_of))
     runs = pd.DataFrame([_row(tile, frame) for tile, frame in times.items()])
     warnings = [] if times else missing([MODEL])
     notes = _notes(times) if times else []
@@ -64,7 +65,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Tile size",
         source=SOURCE,
         cells=cells + rows,
-        figures=_figures(rows),
+        figures=[CellFigure("time", _draw)] if rows else [],
         notes=notes,
         warnings=warnings,
         tables={"runs": runs},
@@ -98,7 +99,7 @@ def _notes(times: dict[int, Run]) -> list[str]:
     return [
         (
             f"{waits} launches a frame, each waited for: {waits_ms(frame):.1f} ms at {frame.machine.launch.sync_us:g} "
-            f"us, fitted at tile {FITTED_TILE}; {INTEROP_MS:g} ms to map the window's buffer, fitted in models. The "
+            f"us; {INTEROP.number:g} ms to map the window's buffer. The "
             "kernels' instructions, loads and chains are counted by hand from his source, none is fitted."
         ),
         (
@@ -106,23 +107,17 @@ def _notes(times: dict[int, Run]) -> list[str]:
             "holds 16 lists at once at 4x4 and at 8x8, but at 4x4 they are more in all, and dearer to fill; at 16x16 "
             "and 32x32 it holds 4 lists and 1, each longer than that of any tile inside it."
         ),
-        "The engine's size on the screen is chosen on its per-primitive time (models).",
     ]
 
 
-def _figures(rows: list[Cell]) -> list[Figure]:
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     """Draw ours beside his."""
-    if not rows:
-        return []
+    rows = [c for c in cells if c.column == "time"]
     bars = pd.DataFrame([{"tile": c.row, "ours": c.ours, "published": c.published, "status": c.status} for c in rows])
-
-    def times(path: Path) -> None:
-        paired_bars(
-            bars, path, label="tile", ours="ours", published="published", status="status",
-            title="The engine by tile size (GT 750M)", y_label="ms",
-        )  # fmt: skip
-
-    return [Figure("time", times)]
+    paired_bars(
+        bars, path, label="tile", ours="ours", published="published", status="status",
+        title="The engine by tile size (GT 750M)", y_label="ms",
+    )  # fmt: skip
 
 
 def _row(tile: int, frame: Run) -> dict[str, object]:
@@ -132,7 +127,7 @@ def _row(tile: int, frame: Run) -> dict[str, object]:
         "tile": tile,
         "frame_ms": frame_ms(frame),
         "waits_ms": waits_ms(frame),
-        "interop_ms": INTEROP_MS,
+        "interop_ms": INTEROP.value,
         **{f"{stage}_ms": float(ms) for stage, ms in frame.stages.milliseconds.items()},
         "raster_bound": row.bound,
         "sample_tests": row.sample_tests,

@@ -15,7 +15,7 @@ from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.silicon.inputs import write_inputs
 from tilestamp.experiments.silicon.unseen_scenes import unseen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
-from tilestamp.experiments.validation.stored import compare
+from tilestamp.experiments.validation.stored import compare, executions
 from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
 from tilestamp.models.machine import load_machine
 
@@ -35,7 +35,7 @@ def run(progress: Callable[[str], None]) -> Result:
     with TemporaryDirectory() as folder:
         left_out = write_inputs(Path(folder), unseen_scenes())
         widest = int(os.environ.get(WIDTH, "2048"))
-        table = compare(
+        executed = executions(
             MEASURED,
             load_machine("h200"),
             progress,
@@ -44,6 +44,7 @@ def run(progress: Callable[[str], None]) -> Result:
             guard_band=True,
             left_out=left_out,
         )
+        table = compare(MEASURED, executed)
     walls = table[table.quantity == WALL].ours
     table = table[table.quantity != WALL]
     kernels = by_kernel(table)
@@ -93,5 +94,6 @@ def cells_of(table: "pd.DataFrame") -> list[Cell]:
     for r in shown.itertuples():
         label = f"{r.scene} {r.W}" + (f" tile {r.tile}" if r.tile else "") + (f" spp {r.spp}" if r.spp else "")
         unit = "us" if r.quantity == TIME else ""
-        cells.append(Cell(label, f"{r.kernel} {r.quantity}", unit, published=r.measured, ours=r.ours, aim=r.aim))
+        column, frame = f"{r.kernel} {r.quantity}", f"{r.scene} {r.W}"
+        cells.append(Cell(label, column, unit, published=r.measured, ours=r.ours, aim=r.aim, frame=frame))
     return cells

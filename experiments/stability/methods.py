@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tilestamp import Run, simulate
 from tilestamp.models.kernel import kernel
 from tilestamp.models.machine import Machine, load_machine
-from tilestamp.models.used import remembered
+from tilestamp.models.remembered import remembered
 from tilestamp.simulator.reference.coverage import exact_coverage
 from tilestamp.simulator.scenes.camera_files import CameraSource
 from tilestamp.simulator.scenes.scene import Scene

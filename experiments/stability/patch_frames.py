@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
+from tilestamp.models.remembered import remembered
 from tilestamp.models.simt import Simt
-from tilestamp.models.used import remembered
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH, SubPatches, bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count

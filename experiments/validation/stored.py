@@ -1,7 +1,8 @@
 """Stored measurements: tidy CSV files, and our prediction of every kernel in them."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from tilestamp.experiments.validation.quantities import (
 from tilestamp.models.errors import MissingInputError, TilestampError
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
+from tilestamp.models.remembered import priced_property
 from tilestamp.models.traffic import traffic
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
@@ -39,7 +41,43 @@ AS_PUBLISHED = "as_published"  # CudaRaster whose setup and bin raster copy thei
 WIDEST = {FREEPIPE: 1024, CUDARASTER: 2048}  # pixels: FreePipe on wider screens takes our counting minutes
 
 
-def compare(
+@dataclass(frozen=True)
+class Execution:
+    """One measured kernel as we executed it: what prices make of it is priced once.
+
+    Parameters
+    ----------
+    file : str
+        Where it was measured.
+    key : tuple
+        Scene, width, tile, samples, kernel.
+    work : Work
+    pipeline : str
+    machine : Machine
+    seconds : float
+        That executing it took us.
+    """
+
+    file: str
+    key: tuple[Any, ...]
+    work: Work
+    pipeline: str
+    machine: Machine
+    seconds: float
+
+    @priced_property
+    def launch(self) -> Launch:
+        """The kernel in machine events."""
+        mix = load_mix(self.pipeline, self.machine.compute_capability)
+        return mix.launch(self.work, self.machine.sm.warp_size)
+
+    @priced_property
+    def microseconds(self) -> float:
+        """Its time, where its buffers are in the cache."""
+        return warm_microseconds(self.launch, self.machine)
+
+
+def executions(
     folder: Path,
     machine: Machine,
     say: Say,
@@ -48,8 +86,8 @@ def compare(
     widest: int | None = None,
     guard_band: bool = False,
     left_out: list[str] | None = None,
-) -> "pd.DataFrame":
-    """Predict what a folder of measurements holds.
+) -> Iterator[Execution]:
+    """Execute what a folder of measurements holds.
 
     Parameters
     ----------
@@ -66,6 +104,29 @@ def compare(
         Whether the CudaRaster that was measured leaves triangles whole that leave the screen by little.
     left_out : list of str, optional
         Takes a sentence for each scene whose model is not at hand; without it that is an error.
+    """
+    widths = {name: min(most, widest or most) for name, most in WIDEST.items()}
+    works: dict[str, Callable[[], Iterator[tuple[tuple[Any, ...], Work]]]] = {
+        MICROPOLYGON: lambda: _micropolygon(folder, machine, say, left_out),
+        FREEPIPE: lambda: freepipe_works(folder, machine, say, widths[FREEPIPE], inputs),
+        CUDARASTER: lambda: cudaraster_works(folder, machine, say, widths[CUDARASTER], inputs, guard_band=guard_band),
+    }
+    for file, execute in works.items():
+        if (folder / file).is_file():
+            begun = time.perf_counter()
+            for key, work in execute():
+                yield Execution(file, key, work, file.removesuffix(".csv"), machine, time.perf_counter() - begun)
+                begun = time.perf_counter()
+
+
+def compare(folder: Path, executed: Iterable[Execution]) -> "pd.DataFrame":
+    """Predict what a folder of measurements holds.
+
+    Parameters
+    ----------
+    folder : Path
+    executed : iterable of Execution
+        Of that folder.
 
     Returns
     -------
@@ -80,18 +141,8 @@ def compare(
     """
     import pandas as pd
 
-    rows: list[dict[str, Any]] = []
-    widths = {name: min(most, widest or most) for name, most in WIDEST.items()}
-    if (folder / MICROPOLYGON).is_file():
-        rows += _rows(read(folder / MICROPOLYGON), _micropolygon(folder, machine, say, left_out), machine)
-    if (folder / FREEPIPE).is_file():
-        rows += _rows(read(folder / FREEPIPE), _freepipe(folder, machine, say, widths[FREEPIPE], inputs), machine)
-    if (folder / CUDARASTER).is_file():
-        rows += _rows(
-            read(folder / CUDARASTER),
-            _cudaraster(folder, machine, say, widths[CUDARASTER], inputs, guard_band=guard_band),
-            machine,
-        )
+    measured = {name: read(folder / name) for name in (MICROPOLYGON, FREEPIPE, CUDARASTER) if (folder / name).is_file()}
+    rows = [row for execution in executed for row in _rows(measured[execution.file], execution)]
     if not rows:
         names = f"{MICROPOLYGON}, {FREEPIPE} or {CUDARASTER}"
         raise TilestampError(f"{folder} holds no measurements that we can predict: no {names} with inputs beside it")
@@ -129,9 +180,8 @@ def _tall(table: "pd.DataFrame") -> "pd.DataFrame":
 
 def _micropolygon(
     folder: Path, machine: Machine, say: Say, left_out: list[str] | None
-) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    """Launches of every scene that has a camera, in its own order and shuffled."""
-    mix = load_mix("micropolygon", machine.compute_capability)
+) -> Iterator[tuple[tuple[Any, ...], Work]]:
+    """Kernels of every scene that has a camera, in its own order and shuffled."""
     keys = read(folder / MICROPOLYGON)
     measured, padded = {key[0] for key in keys}, {key[0] for key in keys if key[4] in PADDED}
     for name, camera in cameras(folder).items():
@@ -147,15 +197,7 @@ def _micropolygon(
                     continue
                 for case in back_end(grids, camera, machine.simt, padded=scene in padded):
                     key = (scene, camera["width"], case.tile, case.spp, case.kernel)
-                    yield key, mix.launch(case.work, machine.sm.warp_size)
-
-
-def _freepipe(
-    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None
-) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    mix = load_mix("freepipe", machine.compute_capability)
-    for key, work in freepipe_works(folder, machine, say, widest, inputs):
-        yield key, mix.launch(work, machine.sm.warp_size)
+                    yield key, case.work
 
 
 def freepipe_works(
@@ -167,14 +209,6 @@ def freepipe_works(
         for kernel in ("freepipe", "freepipe_early"):
             works = _draw("freepipe", source, width, height, machine, early=kernel == "freepipe_early")
             yield (scene, width, 0, 0, kernel), works[0]
-
-
-def _cudaraster(
-    folder: Path, machine: Machine, say: Say, widest: int, inputs: Path | None, *, guard_band: bool
-) -> Iterator[tuple[tuple[Any, ...], Launch]]:
-    mix = load_mix("cudaraster", machine.compute_capability)
-    for key, work in cudaraster_works(folder, machine, say, widest, inputs, guard_band=guard_band):
-        yield key, mix.launch(work, machine.sm.warp_size)
 
 
 def cudaraster_works(
@@ -220,32 +254,28 @@ def _sizes(path: Path) -> list[tuple[str, int, int]]:
     return [(str(s), int(w), int(h)) for s, w, h in table.itertuples(index=False)]
 
 
-def _rows(
-    measured: dict[tuple[Any, ...], float], predicted: Iterator[tuple[tuple[Any, ...], Launch]], machine: Machine
-) -> Iterator[dict[str, Any]]:
+def _rows(measured: dict[tuple[Any, ...], float], execution: Execution) -> Iterator[dict[str, Any]]:
     """Ours beside measured, wherever something was measured."""
     begun = time.perf_counter()
-    for key, launch in predicted:
-        about = dict(zip(KEYS, key, strict=True))
-        for quantity in QUANTITIES:
-            parts = [measured[(*key, metric)] for metric in quantity.metrics if (*key, metric) in measured]
-            if parts and (sum(parts) or quantity.aim):
-                ours, theirs = quantity.ours(launch), sum(parts)
-                error = ours - theirs if quantity.absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
-                yield about | _entry(quantity.name, ours, theirs, error, quantity.aim)
-        cold = traffic([launch], machine)[0]
-        for moved in MOVED_LOCAL if key[4].endswith(VARIANT) else MOVED:
-            theirs = sum(w * measured.get((*key, metric), 0.0) for metric, w in moved.metrics)
-            if (*key, moved.metrics[0][0]) in measured and theirs > 0:
-                ours = moved.ours(launch, cold)
-                yield about | _entry(moved.name, ours, theirs, ours / theirs - 1.0, MOVED_AIM)
-        if (*key, TIME_METRIC) in measured:
-            theirs = measured[(*key, TIME_METRIC)]
-            ours = warm_microseconds(launch, machine)
-            yield about | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
-        now = time.perf_counter()
-        yield about | _entry(WALL, now - begun, WALL_AIM, 0.0, None)
-        begun = now
+    key, launch = execution.key, execution.launch
+    about = dict(zip(KEYS, key, strict=True))
+    for quantity in QUANTITIES:
+        parts = [measured[(*key, metric)] for metric in quantity.metrics if (*key, metric) in measured]
+        if parts and (sum(parts) or quantity.aim):
+            ours, theirs = quantity.ours(launch), sum(parts)
+            error = ours - theirs if quantity.absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
+            yield about | _entry(quantity.name, ours, theirs, error, quantity.aim)
+    cold = traffic([launch], execution.machine)[0]
+    for moved in MOVED_LOCAL if key[4].endswith(VARIANT) else MOVED:
+        theirs = sum(w * measured.get((*key, metric), 0.0) for metric, w in moved.metrics)
+        if (*key, moved.metrics[0][0]) in measured and theirs > 0:
+            ours = moved.ours(launch, cold)
+            yield about | _entry(moved.name, ours, theirs, ours / theirs - 1.0, MOVED_AIM)
+    if (*key, TIME_METRIC) in measured:
+        theirs, ours = measured[(*key, TIME_METRIC)], execution.microseconds
+        yield about | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
+    seconds = execution.seconds + time.perf_counter() - begun
+    yield about | _entry(WALL, seconds, WALL_AIM, 0.0, None)
 
 
 def _entry(quantity: str, ours: float, measured: float, error: float, aim: float | None) -> dict[str, Any]:

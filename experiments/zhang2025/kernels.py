@@ -47,13 +47,13 @@ def run(progress: Callable[[str], None]) -> Result:
             drawn = draw(scene, machine, optimized=optimized)
             timings = profile(drawn.on(profiled(machine)))
             times = {kernel: timing.milliseconds * 1e3 for kernel, timing in timings.items()}
+            name = f"{machine} {BASE} {column.removesuffix('_us')}"
             for kernel, asked in table[column].items():
-                name = f"{machine} {BASE} {column.removesuffix('_us')}"
                 cells.append(Cell(str(kernel), name, "us", published=float(asked), ours=times[str(kernel)], aim=AIM))
                 ratios.append(times[str(kernel)] / float(asked))
             total, ours = float(table[column].sum()), sum(times.values())
             cells.append(
-                Cell("sum", f"{machine} {BASE} {column.removesuffix('_us')}", "us", published=total, ours=ours, aim=0.3)
+                Cell("sum", name, "us", published=total, ours=ours, aim=0.3, of=tuple((k, name) for k in times))
             )
         if machine == CANDIDATES[0]:
             cells += _traffic(table, timings)
@@ -125,6 +125,7 @@ def _saved(cells: list[Cell], machine: str) -> list[Cell]:
             "us",
             published=float(b.published) - float(a.published),  # type: ignore[arg-type]
             ours=float(b.ours) - float(a.ours),
+            of=((b.row, b.column), (a.row, a.column)),
         )
         for b, a in pairs
     ]
