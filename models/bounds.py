@@ -32,25 +32,25 @@ from tilestamp.models.traffic import Traffic
 SERVERS = ("dram", "l2", "atomic", "queue")  # of the whole chip
 
 
-class Asked(NamedTuple):
-    """What a launch asks of a machine: all that is known before its time is."""
+class Pricing(NamedTuple):
+    """A launch on a machine, and all that its time follows from."""
 
     launch: Launch
     machine: Machine
-    moved: Traffic
-    held: Residency
+    traffic: Traffic
+    residency: Residency
     units: Demand
     terms: dict[str, float]
 
 
-def asked_of(launch: Launch, machine: Machine, moved: Traffic) -> Asked:
+def pricing_of(launch: Launch, machine: Machine, traffic: Traffic) -> Pricing:
     """Demands of the units and cycles of the terms.
 
     Parameters
     ----------
     launch : Launch
     machine : Machine
-    moved : Traffic
+    traffic : Traffic
         Its bytes, from ``tilestamp.models.traffic``.
 
     Raises
@@ -58,86 +58,91 @@ def asked_of(launch: Launch, machine: Machine, moved: Traffic) -> Asked:
     TilestampError
         A block that the machine cannot launch.
     """
-    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    units = demand(launch, machine, moved)
-    return Asked(launch, machine, moved, held, units, bound_terms(launch, machine, units, held))
+    resident = residency(machine, launch.block, launch.registers, launch.shared_bytes)
+    units = demand(launch, machine, traffic)
+    return Pricing(launch, machine, traffic, resident, units, bound_terms(launch, machine, units, resident))
 
 
-def bounds(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
-    """Price one launch by its largest term; parameters as of ``asked_of``."""
-    return roofline(asked_of(launch, machine, moved))
+def bounds(launch: Launch, machine: Machine, traffic: Traffic) -> Timing:
+    """Price one launch by its largest term; parameters as of ``pricing_of``."""
+    return roofline(pricing_of(launch, machine, traffic))
 
 
-def roofline(asked: Asked) -> Timing:
-    """Take the largest term of what was asked."""
-    terms = asked.terms
+def roofline(pricing: Pricing) -> Timing:
+    """Take the largest term."""
+    terms = pricing.terms
     bound = max(terms, key=lambda name: terms[name])
-    return timing(asked, terms["launch"] + longest(terms, asked.units), bound, "bounds")
+    return timing(pricing, terms["launch"] + longest(terms, pricing.units), bound, "bounds")
 
 
-def bound_terms(launch: Launch, machine: Machine, asked: Demand, held: Residency) -> dict[str, float]:
+def bound_terms(launch: Launch, machine: Machine, units: Demand, resident: Residency) -> dict[str, float]:
     """Cycles of each term."""
     sms = machine.sm.count
-    units = len(asked.alone)
-    places = slots(launch, machine, held)
-    resident = max(1, min(units, int(places.sum())))
-    busy = max(1, min(units, int(np.count_nonzero(places))))
+    count = len(units.alone)
+    places = slots(launch, machine, resident)
+    together = max(1, min(count, int(places.sum())))
+    busy = max(1, min(count, int(np.count_nonzero(places))))
     blocks = launch.grid if launch.dispatch == "blocks" else 0
-    local = {"issue": asked.issue.sum(), "shared": asked.shared.sum(), "l1": asked.l1.sum()}
+    local = {"issue": units.issue.sum(), "shared": units.shared.sum(), "l1": units.l1.sum()}
     return {
         **{name: float(cycles) / sms for name, cycles in local.items()},
         "balance": float(max(local.values())) / busy if busy < sms else 0.0,
-        "latency": float(asked.chain.sum()) / resident,
-        "dram": float(asked.dram.sum()),
-        "l2": float(asked.l2.sum()),
-        "atomic": float(asked.atomic.sum()),
-        "queue": float(asked.queue.sum()),
+        "latency": float(units.chain.sum()) / together,
+        "dram": float(units.dram.sum()),
+        "l2": float(units.l2.sum()),
+        "atomic": float(units.atomic.sum()),
+        "queue": float(units.queue.sum()),
         "start": blocks / machine.launch.blocks_per_us * machine.sm.clock_mhz,
         "launch": machine.launch.kernel_us * machine.sm.clock_mhz,
     }
 
 
-def longest(terms: dict[str, float], asked: Demand) -> float:
+def longest(terms: dict[str, float], units: Demand) -> float:
     """Cycles of the term that takes longest, the way to the chip's servers and back included."""
-    way = float(asked.chain.min()) if len(asked.chain) else 0.0
+    way = float(units.chain.min()) if len(units.chain) else 0.0
     return max(value + (way if name in SERVERS and value else 0.0) for name, value in terms.items() if name != "launch")
 
 
-def slots(launch: Launch, machine: Machine, held: Residency) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def slots(launch: Launch, machine: Machine, resident: Residency) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Units that each SM can hold: blocks dealt to the SMs one after another, warps where each warp draws its own."""
     sms = machine.sm.count
-    blocks = min(launch.grid, sms * held.blocks)
+    blocks = min(launch.grid, sms * resident.blocks)
     dealt = np.full(sms, blocks // sms, np.int64)
     dealt[: blocks % sms] += 1
     return dealt * (-(-launch.block // machine.sm.warp_size) if launch.dispatch == "warp_queue" else 1)
 
 
 def timing(
-    asked: Asked, cycles: float, bound: str, fidelity: str, spread: tuple[float, float] | None = None, **details: float
+    pricing: Pricing,
+    cycles: float,
+    bound: str,
+    fidelity: str,
+    spread: tuple[float, float] | None = None,
+    **details: float,
 ) -> Timing:
     """Put a result together; ``spread`` is the lowest and the highest that ``cycles`` may be."""
-    low, high = (edge / asked.machine.clock_hz * 1e3 for edge in spread or (cycles, cycles))
+    low, high = (edge / pricing.machine.clock_hz * 1e3 for edge in spread or (cycles, cycles))
     return Timing(
-        stage=asked.launch.stage,
-        kernel=asked.launch.kernel,
-        term_cycles=asked.terms,
+        stage=pricing.launch.stage,
+        kernel=pricing.launch.kernel,
+        term_cycles=pricing.terms,
         cycles=cycles,
-        milliseconds=cycles / asked.machine.clock_hz * 1e3,
+        milliseconds=cycles / pricing.machine.clock_hz * 1e3,
         bound=bound,
-        occupancy=asked.held.occupancy,
-        dram_bytes=asked.moved.dram_bytes,
-        l2_bytes=asked.moved.l2_bytes,
-        details={"resident_blocks": float(asked.held.blocks)} | details,
+        occupancy=pricing.residency.occupancy,
+        dram_bytes=pricing.traffic.dram_bytes,
+        l2_bytes=pricing.traffic.l2_bytes,
+        details={"resident_blocks": float(pricing.residency.blocks)} | details,
         fidelity=fidelity,
         low=low,
         high=high,
-        residency=_steps(asked),
+        residency=_steps(pricing),
     )
 
 
-def _steps(asked: Asked) -> str:
+def _steps(pricing: Pricing) -> str:
     """Say where a time may step: blocks that an SM holds, and the rounds in which all SMs take the grid."""
-    held = f"{asked.held.blocks} an SM by {asked.held.limit}"
-    if asked.launch.dispatch != "blocks":
+    held = f"{pricing.residency.blocks} an SM by {pricing.residency.limit}"
+    if pricing.launch.dispatch != "blocks":
         return held
-    return f"{held}, {asked.launch.grid / (asked.held.blocks * asked.machine.sm.count):.2f} rounds"
+    return f"{held}, {pricing.launch.grid / (pricing.residency.blocks * pricing.machine.sm.count):.2f} rounds"

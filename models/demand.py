@@ -58,14 +58,14 @@ class Demand:
     alone: Cycles
 
 
-def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
+def demand(launch: Launch, machine: Machine, traffic: Traffic) -> Demand:
     """Cycles that each unit of a launch asks for.
 
     Parameters
     ----------
     launch : Launch
     machine : Machine
-    moved : Traffic
+    traffic : Traffic
         Bytes of the launch.
     """
     events = launch.events
@@ -76,16 +76,16 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     passes = (events[:, E.SHARED] + events[:, E.SHARED_ATOMIC]) * groups + events[:, E.BANK_REPLAYS]
     bytes_moved = events[:, E.LOAD_BYTES] + events[:, E.STORE_BYTES]
     share = _shares(bytes_moved)
-    chain = _chain(launch, machine, moved)
+    chain = _chain(launch, machine, traffic)
     queue = _shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine)
-    l2_cycles = _l2_cycles(moved, machine)
+    l2_cycles = _l2_cycles(traffic, machine)
     warps = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
     spread = machine.sm.schedulers / min(machine.sm.schedulers, warps)
     return Demand(
         issue=issue,
         shared=passes * memory.bank_pass_cycles,
         l1=_l1_cycles(events, machine) + _sent(events, machine),
-        dram=share * (moved.dram_bytes / machine.dram_bytes_per_cycle),
+        dram=share * (traffic.dram_bytes / machine.dram_bytes_per_cycle),
         l2=share * l2_cycles,
         atomic=_atomic(events, machine) + (queue if machine.atomics.place == "dram_lock" else 0.0),
         queue=queue,
@@ -108,24 +108,24 @@ def _l1_cycles(events: Cycles, machine: Machine) -> Cycles:
     return cycles
 
 
-def _l2_cycles(moved: Traffic, machine: Machine) -> float:
+def _l2_cycles(traffic: Traffic, machine: Machine) -> float:
     """L2 cycles of all bytes: stores may be slower than loads."""
     memory = machine.memory
     if not memory.l2_bytes:
         return 0.0
-    stores = moved.written_bytes / (memory.l2_write_bytes_per_clock or memory.l2_bytes_per_clock)
-    return (moved.l2_bytes - moved.written_bytes) / memory.l2_bytes_per_clock + stores
+    stores = traffic.written_bytes / (memory.l2_write_bytes_per_clock or memory.l2_bytes_per_clock)
+    return (traffic.l2_bytes - traffic.written_bytes) / memory.l2_bytes_per_clock + stores
 
 
 def _dispatch(events: Cycles, machine: Machine) -> Cycles:
-    """SM cycles in which the schedulers are held."""
+    """SM cycles in which the schedulers are busy."""
     costs = np.array([getattr(machine.issue, event.name.lower()) for event in INSTRUCTION_CLASSES])
-    held: Cycles = events[:, : len(INSTRUCTION_CLASSES)] @ costs
-    return held / machine.sm.schedulers
+    cycles: Cycles = events[:, : len(INSTRUCTION_CLASSES)] @ costs
+    return cycles / machine.sm.schedulers
 
 
 def _fullest_pipe(events: Cycles, machine: Machine) -> Cycles:
-    """SM cycles of the execution unit that is held longest."""
+    """SM cycles of the execution unit that is busy longest."""
     pipe = machine.pipe
     pipes = (
         events[:, E.FP32] * pipe.fp32,
@@ -137,11 +137,11 @@ def _fullest_pipe(events: Cycles, machine: Machine) -> Cycles:
     return longest / machine.sm.schedulers
 
 
-def _chain(launch: Launch, machine: Machine, moved: Traffic) -> Cycles:
+def _chain(launch: Launch, machine: Machine, traffic: Traffic) -> Cycles:
     """Cycles of the dependent round trips of each unit; a block also waits for its own start."""
     latency = machine.latency
     near = latency.l2_cycles if machine.memory.l2_bytes else latency.dram_cycles
-    load = near + (latency.dram_cycles - near) * min(1.0, moved.load_miss)
+    load = near + (latency.dram_cycles - near) * min(1.0, traffic.load_miss)
     columns = [E.CHAIN_ALU, E.CHAIN_SHARED, E.CHAIN_LOAD, E.CHAIN_ATOMIC, E.CHAIN_BARRIER]
     cycles = [latency.alu_cycles, latency.shared_cycles, load, latency.atomic_cycles, latency.barrier_cycles]
     waited: Cycles = launch.events[:, columns] @ np.array(cycles)
@@ -170,7 +170,7 @@ def _rate(events: Cycles, awaited: float, unawaited: float) -> float:
 
 
 def _fullest_queue(launch: Launch, machine: Machine) -> float:
-    """Cycles for which the atomic unit with the most requests is held."""
+    """Cycles for which the atomic unit with the most requests is busy."""
     if launch.atomic_requests is None or not launch.atomic_requests.any():
         return 0.0
     atomics = machine.atomics

@@ -11,7 +11,7 @@ from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
 
 
-def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
+def pipe_time(launch: PipeLaunch, machine: Machine, traffic: Traffic) -> Timing:
     """Price one pass: launch overhead and the slowest of units and DRAM.
 
     Raises
@@ -29,7 +29,7 @@ def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
         )
     ratio = machine.sm.clock_mhz / pipe.clock_mhz  # terms are in cycles of the SMs, like those of every launch
     terms = {name: count / pipe.per_clock[name] * ratio for name, count in launch.items.items()}
-    terms["dram"] = moved.dram_bytes / machine.dram_bytes_per_cycle
+    terms["dram"] = traffic.dram_bytes / machine.dram_bytes_per_cycle
     slowest = max(terms.values())
     terms["launch"] = machine.launch.kernel_us * machine.sm.clock_mhz
     cycles = terms["launch"] + slowest
@@ -43,7 +43,7 @@ def pipe_time(launch: PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
         high=cycles / machine.clock_hz * 1e3,
         bound=max(terms, key=lambda name: terms[name]),
         occupancy=0.0,
-        dram_bytes=moved.dram_bytes,
-        l2_bytes=moved.l2_bytes,
+        dram_bytes=traffic.dram_bytes,
+        l2_bytes=traffic.l2_bytes,
         fidelity="bounds",
     )

@@ -24,7 +24,7 @@ class Stream:
     span_bytes : int
         Bytes that the launch touches between the first and the last touch of a segment: where they fit, it is fetched
         or written once. 0: all footprints of the launch.
-    asked_bytes : int
+    requested_bytes : int
         Of a buffer that units read again: bytes that all units together ask for, each segment once a unit. Where L1
         keeps what an SM loaded, more than ``bytes`` of them come from L2, as other SMs hold them. 0: ``bytes``.
     """
@@ -34,7 +34,7 @@ class Stream:
     bytes: int
     footprint_bytes: int
     span_bytes: int = 0
-    asked_bytes: int = 0
+    requested_bytes: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Price: the launches of a frame, in order, on a machine, at the fidelity asked for."""
+"""Price: the launches of a frame, in order, on a machine, at the fidelity requested."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -49,25 +49,25 @@ def price(
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
     note("machines", machine.name, machine.digest)
     machine = machine.as_moved
-    moved = traffic(launches, machine)
+    traffics = traffic(launches, machine)
     if fidelity == "auto":
-        return auto(launches, machine, moved, error)
-    return [_one(launch, machine, bytes_, fidelity) for launch, bytes_ in zip(launches, moved, strict=True)]
+        return auto(launches, machine, traffics, error)
+    return [_one(launch, machine, bytes_, fidelity) for launch, bytes_ in zip(launches, traffics, strict=True)]
 
 
-def _one(launch: Launch | PipeLaunch, machine: Machine, moved: Traffic, fidelity: Fidelity) -> Timing:
+def _one(launch: Launch | PipeLaunch, machine: Machine, bytes_: Traffic, fidelity: Fidelity) -> Timing:
     if fidelity == "counts":
-        return _counts(launch, machine, moved)
+        return _counts(launch, machine, bytes_)
     if isinstance(launch, PipeLaunch):
-        return pipe_time(launch, machine, moved)
-    return schedule(launch, machine, moved) if fidelity == "schedule" else bounds(launch, machine, moved)
+        return pipe_time(launch, machine, bytes_)
+    return schedule(launch, machine, bytes_) if fidelity == "schedule" else bounds(launch, machine, bytes_)
 
 
-def _counts(launch: Launch | PipeLaunch, machine: Machine, moved: Traffic) -> Timing:
+def _counts(launch: Launch | PipeLaunch, machine: Machine, bytes_: Traffic) -> Timing:
     """Everything but time."""
     nan = float("nan")
     occupancy = 0.0
     if isinstance(launch, Launch):
         occupancy = residency(machine, launch.block, launch.registers, launch.shared_bytes).occupancy
-    bytes_ = moved.dram_bytes, moved.l2_bytes
-    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, *bytes_, fidelity="counts")
+    totals = bytes_.dram_bytes, bytes_.l2_bytes
+    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, *totals, fidelity="counts")

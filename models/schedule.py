@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import Asked, asked_of, longest, slots, timing
+from tilestamp.models.bounds import Pricing, longest, pricing_of, slots, timing
 from tilestamp.models.launch import Launch
 from tilestamp.models.list_schedule import list_schedule
 from tilestamp.models.machine import Machine
@@ -44,8 +44,8 @@ EXCESS = 1.15  # times the largest term: from here on balance or tail is what ho
 IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often as the other
 
 
-def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
-    """Price one launch by its units' starts and ends; parameters and errors as of ``asked_of``.
+def schedule(launch: Launch, machine: Machine, traffic: Traffic) -> Timing:
+    """Price one launch by its units' starts and ends; parameters and errors as of ``pricing_of``.
 
     Returns
     -------
@@ -53,8 +53,8 @@ def schedule(launch: Launch, machine: Machine, moved: Traffic) -> Timing:
         Never below ``bounds``. ``details`` has ``busy_sms`` (SMs that got a unit) and ``tail_cycles`` (from the start
         of the last unit to the end).
     """
-    asked = asked_of(launch, machine, moved)
-    return played(asked, loads(asked))
+    pricing = pricing_of(launch, machine, traffic)
+    return played(pricing, loads(pricing))
 
 
 class Loads(NamedTuple):
@@ -97,11 +97,11 @@ class Loads(NamedTuple):
     way: float
 
 
-def loads(asked: Asked) -> Loads:
+def loads(pricing: Pricing) -> Loads:
     """What the units of a launch load the machine with."""
-    launch, machine, units = asked.launch, asked.machine, asked.units
+    launch, machine, units = pricing.launch, pricing.machine, pricing.units
     blocks = launch.dispatch == "blocks"
-    places = slots(launch, machine, asked.held)
+    places = slots(launch, machine, pricing.residency)
     sm = np.maximum(np.maximum(units.issue, units.shared), units.l1)
     start = machine.latency.block_launch_cycles if len(sm) else 0.0
     return Loads(
@@ -110,19 +110,19 @@ def loads(asked: Asked) -> Loads:
         draws=np.empty(0) if blocks else units.queue,
         places=int(places.sum()),
         sms=max(1, int(np.count_nonzero(places))),
-        interval=asked.terms["start"] / max(1, len(sm)),
+        interval=pricing.terms["start"] / max(1, len(sm)),
         start=start if blocks else 0.0,
         begun=0.0 if blocks else start,
-        memory=max(asked.terms["dram"], asked.terms["l2"]),
-        atomic=max(asked.terms["atomic"], asked.terms["queue"] if blocks else 0.0),
+        memory=max(pricing.terms["dram"], pricing.terms["l2"]),
+        atomic=max(pricing.terms["atomic"], pricing.terms["queue"] if blocks else 0.0),
         way=float(units.chain.min()) if len(sm) else 0.0,
     )
 
 
-def played(asked: Asked, units: Loads) -> Timing:
-    """Price what was asked."""
-    terms = asked.terms
-    least = longest(terms, asked.units)
+def played(pricing: Pricing, units: Loads) -> Timing:
+    """Price it."""
+    terms = pricing.terms
+    least = longest(terms, pricing.units)
     low, end, high, started = ends(units)
     sooner, expected, later = (
         together(units, units.begun + e, s) for e, s in ((low, 0.0), (end, IN_THE_WAY), (high, 1.0))
@@ -130,9 +130,9 @@ def played(asked: Asked, units: Loads) -> Timing:
     cycles = max(expected, least)
     tail = max(0.0, cycles - units.begun - started)
     return timing(
-        asked,
+        pricing,
         terms["launch"] + cycles,
-        _holds(terms, cycles, tail, units.sms < asked.machine.sm.count),
+        _holds(terms, cycles, tail, units.sms < pricing.machine.sm.count),
         "schedule",
         (terms["launch"] + max(least, sooner), terms["launch"] + max(least, later)),
         busy_sms=float(min(len(units.alone), units.sms)),

@@ -68,15 +68,17 @@ def _past_l1(streams: tuple[Stream, ...], machine: Machine) -> tuple[Stream, ...
     if float(machine.compute_capability) < L1_HOLDS_LOADS:
         return streams
     sms = machine.sm.count
-    return tuple(replace(stream, bytes=_from_l2(stream, sms)) if stream.asked_bytes else stream for stream in streams)
+    return tuple(
+        replace(stream, bytes=_from_l2(stream, sms)) if stream.requested_bytes else stream for stream in streams
+    )
 
 
 def _from_l2(stream: Stream, sms: int) -> int:
     """Bytes of a stream that no L1 serves."""
-    footprint = min(stream.footprint_bytes, stream.asked_bytes)
+    footprint = min(stream.footprint_bytes, stream.requested_bytes)
     if not footprint:
         return 0
-    again = stream.asked_bytes / footprint
+    again = stream.requested_bytes / footprint
     fetched: float = sms * (1.0 - (1.0 - 1.0 / sms) ** again)
     return round(footprint * fetched)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tilestamp import simulate
 from tilestamp.models.auto import ERROR
-from tilestamp.models.bounds import asked_of, bounds, longest
+from tilestamp.models.bounds import bounds, longest, pricing_of
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.fidelity_bound import latest_end
@@ -46,9 +46,9 @@ def launch(units, block=64, dispatch="blocks", grid=None, **events):
 
 def latest_cycles(what, machine, moved=NOTHING):
     """Cycles of a launch that its schedule cannot exceed."""
-    asked = asked_of(what, machine, moved)
-    end = latest_end(loads(asked))
-    return asked.terms["launch"] + max(end, longest(asked.terms, asked.units))
+    pricing = pricing_of(what, machine, moved)
+    end = latest_end(loads(pricing))
+    return pricing.terms["launch"] + max(end, longest(pricing.terms, pricing.units))
 
 
 @settings(deadline=None, max_examples=100)
@@ -107,9 +107,9 @@ def test_the_bound_holds_for_every_launch_of_every_pipeline_on_every_machine(fra
     for run in frames:
         for what, moved in zip(run.launches, traffic(run.launches, run.machine), strict=True):
             if isinstance(what, Launch):
-                asked = asked_of(what, run.machine, moved)
+                pricing = pricing_of(what, run.machine, moved)
                 latest = latest_cycles(what, run.machine, moved)
-                assert played(asked, loads(asked)).cycles <= latest * ROUNDING, (what.kernel, run.machine.name)
+                assert played(pricing, loads(pricing)).cycles <= latest * ROUNDING, (what.kernel, run.machine.name)
 
 
 @pytest.mark.parametrize("error", [0.01, 0.1])

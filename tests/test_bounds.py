@@ -238,7 +238,7 @@ def test_an_unknown_fidelity_is_refused():
 
 
 def test_a_stream_that_touches_nothing_moves_nothing():
-    asked = Stream("records", "load", 64, 0, asked_bytes=64)
+    asked = Stream("records", "load", 64, 0, requested_bytes=64)
     assert traffic([launch(streams=[asked])], H200)[0].l2_bytes == 0
 
 

@@ -1,6 +1,6 @@
 """Events of tile raster and dicing that follow from the lengths of lists, by hand; a transaction is 32 bytes.
 
-What hangs on coverage is in ``naive_tiles``.
+What depends on coverage is in ``naive_tiles``.
 """
 
 import numpy as np

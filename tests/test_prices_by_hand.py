@@ -214,7 +214,7 @@ def test_a_store_larger_than_the_cache_goes_through():
 
 def test_an_l1_that_holds_loads_asks_once_an_sm():
     """Two SMs; a footprint asked for three times over comes 2 (1 - 1/8) times."""
-    shared = type(stream("a", "load", 1))("a", "load", 3000, 1000, asked_bytes=3000)
+    shared = type(stream("a", "load", 1))("a", "load", 3000, 1000, requested_bytes=3000)
     (moved,) = traffic([launch(streams=[shared])], MACHINE)
     assert (moved.l2_bytes, moved.dram_bytes) == (1750, 1000)
 

@@ -144,7 +144,7 @@ def test_each_thread_of_a_block_stores_its_copy_of_the_parameters():
 
 
 def _from_l2(machine, asked, footprint=32000):
-    stream = Stream("vertices", "load", footprint, footprint, asked_bytes=asked)
+    stream = Stream("vertices", "load", footprint, footprint, requested_bytes=asked)
     launch = Launch(
         stage="s",
         kernel="k",

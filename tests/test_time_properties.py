@@ -360,7 +360,7 @@ def test_a_larger_cache_moves_no_more_bytes_in_all(frame, share, cache, more):
 @given(launch=launches(), sizes=st.tuples(st.integers(1, 10**7), st.integers(1, 10**9)), more=st.integers(1, 132))
 def test_more_sms_that_share_an_l2_cost_no_more_than_their_share(launch, sizes, more):
     """Each fetches from L2 what it keeps in its L1: the bytes grow by no more than the SMs, and so does the time."""
-    what = replace(launch, streams=(Stream("table", "load", sizes[0], sizes[0], asked_bytes=sizes[1]),))
+    what = replace(launch, streams=(Stream("table", "load", sizes[0], sizes[0], requested_bytes=sizes[1]),))
     larger = altered(H200, {"sm.count": H200.sm.count + more}, "assumed", "a test")
     try:
         before = microseconds(what, H200)

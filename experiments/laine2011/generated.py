@@ -4,7 +4,7 @@ What the slides publish is kept: the number of triangles, the share that is visi
 triangle at 1024x768. What they do not is **assumed**: areas are log-normal (sigma 2, cut where a triangle would cover a
 quarter of the viewport), positions uniform, depths random, shapes equilateral, what is not visible faces away;
 triangles come in Morton order of their places, out of order by as much as fills Buddha's bin queues (fitted); no
-vertex is shared. FreePipe hangs on the largest triangles, so its times above all are those of the assumption.
+vertex is shared. FreePipe depends on the largest triangles, so its times above all are those of the assumption.
 """
 
 import os
@@ -157,5 +157,5 @@ def warning() -> str:
     """Say that the scenes are not the authors'."""
     return (
         "GENERATED SCENES, not the authors': triangles, visible share and pixels a triangle as published; the spread "
-        f"of areas (log-normal, sigma {SIGMA:g}) and all places are assumed, and FreePipe's times hang on that spread"
+        f"of areas (log-normal, sigma {SIGMA:g}) and all places are assumed, and FreePipe's times depend on that spread"
     )

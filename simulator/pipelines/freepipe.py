@@ -20,7 +20,7 @@ from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle
 from tilestamp.simulator.work import Work
 
 REMARKS = {
-    "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows hangs on the packing",
+    "tied_pixels": "{:,} pixels have several triangles at the nearest depth: which one shows depends on the packing",
     "mixed_pixels": "{:,} pixels mix the halves of two triangles' colours",
 }
 
@@ -65,7 +65,7 @@ def freepipe(
     Returns
     -------
     Frame
-        ``facts`` say where the picture hangs on something else than depth: ``tied_pixels``, ``mixed_pixels``.
+        ``facts`` say where the picture depends on something else than depth: ``tied_pixels``, ``mixed_pixels``.
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)

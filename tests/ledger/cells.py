@@ -8,7 +8,7 @@ from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.registry import experiment_names, load_experiment
 
 HEADER = ("row", "column", "unit", "what", "value")
-MEASURED = {"frontier/model", "frontier/sampled"}  # their cells are CPU seconds, or hang on those of a calibration
+MEASURED = {"frontier/model", "frontier/sampled"}  # their cells are CPU seconds, or depend on those of a calibration
 QUICK = {  # compared in the default suite; the others by ``pytest -m cells``
     "eisenacher2010/claims", "eisenacher2010/table1", "eisenacher2010/table2", "eisenacher2010/table3",
     "laine2011/memory", "laine2011/table3", "ru2016/tile_size", "zhang2025/graph",

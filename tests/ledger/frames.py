@@ -230,7 +230,7 @@ def _launch(launch: Any) -> dict[str, Any]:
 def _streams(launch: Any) -> dict[str, Any]:
     sizes = {}
     for stream in launch.streams:
-        for size in ("bytes", "footprint_bytes", "span_bytes", "asked_bytes"):
+        for size in ("bytes", "footprint_bytes", "span_bytes", "requested_bytes"):
             sizes[f"stream {stream.buffer} {stream.op} {size}"] = getattr(stream, size, 0)
     return sizes
 

@@ -113,8 +113,8 @@ def _streams(
     records = kept * setup.planes.shape[1] * 4
     return (
         Stream("tile_queues", "load", lists, 4 * entries),
-        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, asked_bytes=headers),
-        Stream("triangle_data", "load", min(rest, records), records, asked_bytes=rest),
+        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, requested_bytes=headers),
+        Stream("triangle_data", "load", min(rest, records), records, requested_bytes=rest),
         Stream("pixels", "load", tiles, pixels if tiles else 0),
         Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
     )

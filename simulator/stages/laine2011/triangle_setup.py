@@ -288,7 +288,7 @@ def _streams(
         data //= 2
     return (
         Stream("indices", "load", indices, indices),
-        Stream("positions", "load", vertices, vertices, asked_bytes=_asked(triangles)),
+        Stream("positions", "load", vertices, vertices, requested_bytes=_asked(triangles)),
         Stream("subtriangles", "store", len(out.first), len(out.first)),
         Stream("headers", "store", headers, headers),
         Stream("triangle_data", "store", data, data),
