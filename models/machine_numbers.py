@@ -52,7 +52,7 @@ def refusal(error: str, sections: dict[str, Any], structs: Mapping[str, type[msg
     return f"{place} is {value}, and no machine has that: it is {what} {low} to {_read(limits.le)}"
 
 
-def _is_within(rate: Any, limits: msgspec.Meta) -> bool:
+def _is_within(rate: object, limits: msgspec.Meta) -> bool:
     low, high = float(limits.ge or 0), float(limits.le or 0)
     return isinstance(rate, int | float) and not isinstance(rate, bool) and low <= rate <= high
 
