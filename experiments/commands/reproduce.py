@@ -93,7 +93,7 @@ def _print_result(result: Result) -> None:
     if result.cells:
         rows = [cell_texts(cell) for cell in result.cells]
         styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
-        print_table(title, COLUMNS, rows, styles)
+        print_table(title, COLUMNS, rows, styles, keys=2)
     else:
         sys.stdout.write(f"{title}\n")
     errors = result.predicted_errors
