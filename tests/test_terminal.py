@@ -41,7 +41,7 @@ def test_each_part_repeats_the_key_columns(lines):
 
 
 def test_a_table_that_fits_exactly_is_one_part(lines):
-    said = lines(terminal.print_table, "title", ["a", "b"], [["x" * 10, "y" * (WIDTH - 12)]])
+    said = lines(terminal.print_table, "title", ["a", "b", "c"], [["x" * 10, "y" * 13, "z" * (WIDTH - 27)]])
     assert len(said) == 3
 
 
