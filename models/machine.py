@@ -7,7 +7,6 @@ keeps where each came from in ``machine.provenance["sm.count"]``.
 Cycles are those of ``sm.clock_mhz``, the clock at which instructions issue (the shader clock up to Fermi).
 """
 
-import difflib
 import hashlib
 import tomllib
 from collections.abc import Mapping
@@ -21,6 +20,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
+from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.models.paths import is_file
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.models.used import note
@@ -133,7 +133,7 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
         path = FOLDER / f"{name_or_path}.toml"
         if not is_file(path):
             known, word = list(list_machines()), str(name_or_path)
-            raise TilestampError(f"no machine {word!r}{_nearest(word.lower(), known)}; known: {', '.join(known)}")
+            raise TilestampError(f"no machine {word!r}{did_you_mean(word.lower(), known)}; known: {', '.join(known)}")
     if not is_file(path):
         raise TilestampError(f"there is no machine file {path}")
     try:
@@ -176,7 +176,7 @@ def altered(
         for step in path:
             section = section.get(step) if isinstance(section, dict) else None
         if not isinstance(section, dict) or isinstance(section.get(last, {}), dict):
-            raise TilestampError(f"{key!r} is no number of a machine{_nearest(str(key), list(machine.provenance))}")
+            raise TilestampError(f"{key!r} is no number of a machine{did_you_mean(str(key), list(machine.provenance))}")
         before = changes.pop(key, (section[last],))[0]
         section[last] = value
         if value != before:
@@ -249,7 +249,7 @@ def _check_keys(table: object, known: list[str], optional: set[str], what: str, 
         raise TilestampError(f"{file}: a {what} must be a table")
     for key in table:
         if key not in known:
-            raise TilestampError(f"{file}: unknown {what} {key!r}{_nearest(key, known)}")
+            raise TilestampError(f"{file}: unknown {what} {key!r}{did_you_mean(key, known)}")
     for key in known:
         if key not in table and key not in optional:
             raise TilestampError(f"{file}: missing {what} {key!r}")
@@ -283,11 +283,3 @@ def _check_sense(machine: Machine, file: str) -> None:
     for sentence, wrong in contradictions.items():
         if wrong:
             raise TilestampError(f"{file} contradicts itself: {sentence}")
-
-
-def _nearest(word: str, known: list[str]) -> str:
-    def distance(other: str) -> tuple[float, bool]:  # of two as near, the one that begins alike: gtx280 for gtx290
-        return -difflib.SequenceMatcher(None, other, word).ratio(), other[:4] != word[:4]
-
-    near = sorted(difflib.get_close_matches(word, known), key=distance)
-    return f" (did you mean {near[0]!r}?)" if near else ""

@@ -9,7 +9,6 @@ import inspect
 import math
 import os
 import textwrap
-from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
@@ -19,6 +18,7 @@ import numpy as np
 from msgspec import inspect as types
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.models.simt import Simt
 
 if TYPE_CHECKING:
@@ -55,9 +55,8 @@ def make_options(kind: type[OptionsT], given: dict[str, Any], owner: str) -> Opt
     known = kind.__struct_fields__
     for name in given:
         if name not in known:
-            near = "".join(f" (did you mean {match}?)" for match in get_close_matches(name, known, 1))
             has = f"it has {', '.join(known)}" if known else "it has none"
-            raise TilestampError(f"{owner} has no option {name}{near}; {has}")
+            raise TilestampError(f"{owner} has no option {name}{did_you_mean(name, known)}; {has}")
     return kind(**given)
 
 

@@ -108,7 +108,7 @@ def _chosen(timings: list[Timing]) -> dict[str, str]:
     told = max(played or timings, key=lambda timing: timing.milliseconds)
     some = 0 < len(played) < len(timings)
     return {
-        "fidelity": f"{len(played)} of {len(timings)} schedule" if some else told.fidelity,
+        "fidelity": f"schedule: {len(played)} of {len(timings)} launches" if some else told.fidelity,
         "why": f"{told.kernel}: {told.why}" if some else told.why,
     }
 

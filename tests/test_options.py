@@ -101,7 +101,7 @@ def test_a_texture_is_an_array_or_its_nested_lists():
 
 def test_an_unknown_option_names_the_nearest_and_all():
     with pytest.raises(
-        TilestampError, match=r"has no option tyle \(did you mean tile\?\); it has tile, cull_backfaces"
+        TilestampError, match=r"has no option tyle \(did you mean 'tile'\?\); it has tile, cull_backfaces"
     ):
         options("tiled", tyle=8)
 
@@ -165,7 +165,7 @@ def test_help_shows_every_option_in_80_columns(name, capsys, monkeypatch):
         (["--no-hybrid", "-O", "hybrid=true"], "hybrid is given twice: false and true"),
         (["--set", "sm.count=8", "--set", "sm.count=9"], "sm.count is given twice: 8 and 9"),
         (["--tile", "8", "--tile", "16"], "--tile"),
-        (["-O", "tyle=8"], "did you mean tile?"),
+        (["-O", "tyle=8"], "did you mean 'tile'?"),
         (["--tyle", "8"], "--tile"),
         (["-O", "tile"], "write NAME=VALUE, not tile"),
         (["--pipeline", "cudaraster", "-O", "guard_band=foo"], "guard_band takes true, false or none, not 'foo'"),

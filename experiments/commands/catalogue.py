@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import option_table
-from tilestamp.experiments.commands.terminal import print_wrapped
+from tilestamp.experiments.commands.terminal import print_entries, print_wrapped
 from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import list_machines, load_machine
@@ -33,14 +33,17 @@ def catalogue(
     kind
         What to list.
     pipeline
-        Whose options.
+        The pipeline whose options are listed.
     machine
-        Say of each option which values this machine can launch, where it cannot all.
+        With options: say which values this machine can launch, where it cannot launch all.
     json_
         Print a JSON object instead of lines.
     """
     if (kind == "options") != (pipeline is not None) or (machine and not pipeline):
-        raise TilestampError("write: tilestamp list options PIPELINE, or list and one of the other kinds")
+        raise TilestampError(
+            "write: tilestamp list options PIPELINE, or tilestamp list and scenes, pipelines, machines or experiments;"
+            " --machine goes with options"
+        )
     if pipeline is not None:
         _list_options(pipeline, machine, json_)
         return
@@ -48,9 +51,7 @@ def catalogue(
     if json_:
         sys.stdout.write(json.dumps(lines) + "\n")
         return
-    width = max(map(len, lines), default=0)
-    for name, line in lines.items():
-        sys.stdout.write(f"{name:{width}}  {line}\n")
+    print_entries(lines)
 
 
 def _list_options(pipeline: str, machine: str | None, json_: bool) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
-from tilestamp.experiments.commands.render_output import as_json, print_run, write_map, write_png
+from tilestamp.experiments.commands.render_output import as_json, map_path, print_run, write_map, write_png
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.paths import is_folder
@@ -22,6 +22,7 @@ PIPELINE = "micropolygon"  # where none is named
 
 def render(
     scene: str,
+    /,
     *,
     pipeline: str = PIPELINE,
     machine: str = "gtx280",
@@ -54,18 +55,19 @@ def render(
         A view of the scene by name, or a JSON file (`FILE.json`, `FILE.json:KEY`).
     fidelity
         counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine; auto:
-        launch by launch bounds where it is proved to be near enough to schedule, which is the rest.
+        for each launch bounds where that is proved near enough to schedule, elsewhere schedule.
     error
-        Relative error that will do, as 0.01: expensive stages execute a random part of their blocks, every number gets
-        its 95 % interval, and there is no picture.
+        Relative error that will do, such as 0.01: expensive stages execute a random part of their blocks, every number
+        gets its 95 % interval, and there is no picture.
     seed
-        Of the random part.
+        Seed of the random part that --error executes.
     counting
         Count what the machine does; without it there is a picture and no time.
     output
         PNG file for the picture.
     map_
-        Also write a heat map of this counter beside the picture, as tests; each pipeline has its own.
+        Also write a heat map of this counter beside the picture, such as tests, into
+        FILE.COUNTER.png; each pipeline has its own.
     json_
         Print one JSON object instead of tables.
     option
@@ -86,13 +88,13 @@ def render(
             say("pricing")
             _ = run.stages
     if map_ is not None and output is not None:
-        write_map(run, map_, output.with_suffix(f".{map_}.png"))
+        write_map(run, map_, map_path(output, map_))
     if output is not None:
         write_png(run.image, output)
     if json_:
         sys.stdout.write(json.dumps(as_json(run)) + "\n")
     else:
-        print_run(run, output)
+        print_run(run, output, map_)
 
 
 def _simulate(
@@ -119,7 +121,7 @@ def parse_size(size: str) -> tuple[int, int]:
     """Take ``1600x1200`` apart."""
     match = re.fullmatch(r"(\d+)[xX](\d+)", size)
     if match is None:
-        raise TilestampError(f"--size is WIDTHxHEIGHT in pixels, as 1600x1200, not {size}")
+        raise TilestampError(f"--size is WIDTHxHEIGHT in pixels, such as 1600x1200, not {size}")
     return int(match[1]), int(match[2])
 
 

@@ -37,6 +37,11 @@ def write_png(image: NDArray[np.uint8], path: Path) -> None:
             partial.unlink(missing_ok=True)
 
 
+def map_path(output: Path, name: str) -> Path:
+    """File of a counter's heat map: ``out.tests.png`` beside ``out.png``."""
+    return output.with_suffix(f".{name}.png")
+
+
 def write_map(run: Run, name: str, path: Path) -> None:
     """Draw a counter's heat map."""
     from tilestamp.reports.heatmap import heat_map
@@ -97,7 +102,7 @@ def _plain(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def print_run(run: Run, output: Path | None) -> None:
+def print_run(run: Run, output: Path | None, map_: str | None = None) -> None:
     """Print the table of stages, and a line for all else that is to be said."""
     title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}"
     if run.counted:
@@ -111,6 +116,7 @@ def print_run(run: Run, output: Path | None) -> None:
     else:
         sys.stdout.write(f"{title}: nothing was counted, so there is no time\n")
     lines = [run.note, *run.frame.remarks, _shown_sample(run), f"picture: {output}" if output else ""]
+    lines += [f"map of {map_}: {map_path(output, map_)}"] if output and map_ else []
     sys.stdout.writelines(f"{line}\n" for line in lines if line)
 
 

@@ -94,7 +94,7 @@ def _print_result(result: Result) -> None:
     if result.cells:
         rows = [cell_texts(cell)[:PRINTED] for cell in result.cells]
         styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
-        print_table(title, COLUMNS[:PRINTED], rows, styles)
+        print_table(title, COLUMNS[:PRINTED], rows, styles, keys=2)
     else:
         sys.stdout.write(f"{title}\n")
     sys.stdout.writelines(f"{sentence}\n" for sentence in averages(result))

@@ -71,7 +71,11 @@ def overhead_ms(run: Run) -> float:
 def stand_in_warnings(*names: str) -> list[str]:
     """What is to be said where models are missing, or their files were not read whole."""
     models = map(model, names)
-    return [f"{STAND_IN if is_stand_in(one) else one.name}: {one.note}" for one in models if one.note]
+    return [
+        f"{STAND_IN if is_stand_in(one) else one.name}: {one.note.removeprefix('stand-in: ')}"
+        for one in models
+        if one.note
+    ]
 
 
 def stage_ms(run: Run, *stages: str) -> float:

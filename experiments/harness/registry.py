@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tilestamp.experiments.harness.result import Result
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.nearest_name import did_you_mean
 
 Progress = Callable[[str], None]
 Experiment = Callable[[Progress], Result]
@@ -70,7 +71,8 @@ def select(names: tuple[str, ...], *, everything: bool = False) -> list[str]:
     for name in names:
         fits = [k for k in known if name in (k, *k.split("/"))] or [k for k in known if k.startswith(name)]
         if not fits:
-            raise TilestampError(f"no experiment is called {name}; there are {', '.join(known)}")
+            near = did_you_mean(name, known)
+            raise TilestampError(f"no experiment is called {name}{near}; tilestamp list experiments names all")
         chosen += fits
     if chosen:
         return list(dict.fromkeys(chosen))

@@ -12,6 +12,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options, make_options
 
@@ -32,7 +33,10 @@ def load_pipeline(name: str) -> Pipeline:
         There is none of that name.
     """
     if not isinstance(name, str) or name not in pipeline_names():
-        raise TilestampError(f"no pipeline is called {name}; there are {', '.join(pipeline_names())}")
+        known = pipeline_names()
+        raise TilestampError(
+            f"no pipeline is called {name}{did_you_mean(str(name), known)}; there are {', '.join(known)}"
+        )
     module = name.replace("-", "_")
     pipeline: Pipeline = getattr(import_module(f"tilestamp.simulator.pipelines.{module}"), module)
     return pipeline

@@ -50,7 +50,7 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     bound: Annotated[float, Meta(gt=0, le=4096)] = 4.0
     """Pixels that a sub-patch may be wide and high on screen."""
     bound_rule: BoundRule = "control_points"
-    """How that is measured: on control points, or as whole pixels, the reading that matches the paper's counts."""
+    """How a sub-patch is measured: on control points, or as whole pixels, which matches the paper's counts."""
     box_tests: bool = True
     """Test boxes before edge functions."""
     edges: Edges = "computed"

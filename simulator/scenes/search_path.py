@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from tilestamp.models.errors import MissingInputError
+from tilestamp.models.nearest_name import did_you_mean
 
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
 LEVELS = 2  # of sub-folders that are looked into
@@ -47,7 +48,9 @@ def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None
     folders = ", ".join(map(str, scene_folders(scene_path)))
     where = f"one of the folders {folders}" if folders else "a folder, and name that folder"
     setting = "" if folders else f" in {SCENES_VARIABLE} (or the setting scene_path)"
+    file = name if Path(name).suffix.lower() in SUFFIXES else f"{name}.bpt, .obj, .ply, .glb or .npz"
+    names = list(known)
     return MissingInputError(
-        f"scene {name!r} is neither a file nor known here ({', '.join(known)}):"
-        f" put {name}.bpt, .obj, .ply, .glb or .npz into {where}{setting}"
+        f"scene {name!r}{did_you_mean(name, names)} is neither a file nor known here ({', '.join(names)}):"
+        f" put {file} into {where}{setting}"
     )
