@@ -8,6 +8,8 @@ from tilestamp.reports.style import PALETTE, PUBLISHED, figure
 if TYPE_CHECKING:
     import pandas as pd
 
+HATCHES = {"partly fitted": "//", "fitted": "//////"}  # of bars, by status
+
 
 def lines(
     table: "pd.DataFrame",
@@ -62,7 +64,7 @@ def paired_bars(
     y_label: str,
     known: str = "published",
 ) -> None:
-    """Draw a bar for each row, solid where predicted and hatched where fitted, the published value as a diamond.
+    """Draw a bar for each row, solid where predicted, hatched where fitted; the published value is a diamond.
 
     Parameters
     ----------
@@ -77,8 +79,8 @@ def paired_bars(
         positions = range(len(table))
         bars = axes.bar(positions, table[ours], color=PALETTE[0], width=0.62)
         for bar, kind in zip(bars, table[status], strict=True):
-            if kind == "fitted":
-                bar.set(facecolor="white", edgecolor=PALETTE[0], hatch="////")
+            if kind in HATCHES:
+                bar.set(facecolor="white", edgecolor=PALETTE[0], hatch=HATCHES[kind])
         (points,) = axes.plot(positions, table[published], **PUBLISHED)
         kinds = {known: points} | dict(zip(table[status], bars, strict=True))
         axes.set_xticks(list(positions), table[label], rotation=45, ha="right", fontsize=8)
