@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tilestamp import simulate
+from tilestamp.models import auto
 from tilestamp.models.auto import ERROR
 from tilestamp.models.bounds import bounds, longest, pricing_of
 from tilestamp.models.errors import TilestampError
@@ -178,3 +179,10 @@ def test_a_fixed_function_pass_is_exact_at_every_fidelity():
 def test_a_launch_without_work_is_known():
     (got,) = price([launch(0, grid=1)], H200, "auto")
     assert got.error_bound == 0.0
+
+
+@pytest.mark.parametrize(("least", "stays"), [(1.0, True), (50.0, False)])
+def test_a_launch_stays_at_its_roofline_where_its_gap_is_small_beside_the_frame(least, stays):
+    """Twice what the roofline says is 5 % of a frame of 100 more cycles, or much more than that."""
+    kept = auto._kept(np.array([100.0, least]), np.array([100.0, 2 * least]), 0.05)
+    assert kept.tolist() == [True, stays]

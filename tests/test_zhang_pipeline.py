@@ -229,6 +229,12 @@ def test_a_graph_takes_its_longest_path():
     assert on_stream(nodes, 1.0, 2.0).cpu_us == 13.0
 
 
+@pytest.mark.parametrize("after", ["a", "b"])
+def test_a_node_that_waits_for_itself_or_a_later_one_is_refused(after):
+    with pytest.raises(KeyError):
+        as_graph([Node("a", 5, (after,)), Node("b", 1)], 1.0, 0.0)
+
+
 def test_nodes_bound_by_memory_share_it():
     alone = as_graph([Node("a", 10, shares=True)], 0.0, 0.0)
     both = as_graph([Node("a", 10, shares=True), Node("b", 4, shares=True), Node("c", 10)], 0.0, 0.0)

@@ -71,7 +71,7 @@ def _toml(text: str) -> Iterator[Change]:
         code = line.split("#")[0]
         if code.startswith("["):
             table = code.strip().strip("[]")
-        elif "=" in code and "source" not in code.split("=")[0]:
+        elif "=" in code and "source" not in code.split("=")[0] and table != "identity":
             key, _, value = code.partition("=")
             found = PRICE.search(value.split("provenance")[0])
             if found:
@@ -151,7 +151,7 @@ def _constant(node: ast.Constant) -> Iterator[tuple]:
             if isinstance(node.value, bool)
             else node.value + 1
             if isinstance(node.value, int)
-            else 1.1 * node.value
+            else 1.1 * node.value or 1.0
         )
         yield f"{node.value} -> {new}", *_span(node), repr(new)
 
