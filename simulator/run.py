@@ -22,6 +22,7 @@ from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
 from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.prices import Machines, Prices, machines_of, stacked
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
@@ -223,6 +224,39 @@ class Run:
             told = ", ".join(differences)
             raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")
         return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
+
+    def prices(self, machines: Machines, *, skip: bool = False) -> Prices:
+        """Price the same work on many machines, at the run's fidelity.
+
+        Parameters
+        ----------
+        machines : iterable of Machine, name or path; or mapping of str to array, (machines,)
+            A mapping, or a DataFrame, has changed numbers of the run's own machine by dotted name:
+            ``{"sm.clock_mhz": [1000.0, 1500.0]}``.
+        skip : bool
+            A machine on which the run has no price gets none (``Prices.refusals`` says why) instead of an error.
+
+        Returns
+        -------
+        Prices
+            (machines, launches): each price is that of ``on(machine)``.
+
+        Raises
+        ------
+        TilestampError
+            A number that no machine has; without ``skip`` also what ``on`` and ``timings`` refuse.
+        """
+        self._check_counted()
+        chosen, timings, refusals = machines_of(machines, self.machine), list[list[Timing]](), dict[int, str]()
+        for place, machine in enumerate(chosen):
+            try:
+                timings.append(self.on(machine).timings)
+            except TilestampError as error:
+                if not skip:
+                    raise
+                refusals[place] = str(error)
+                timings.append([])
+        return stacked(chosen, self.frame.works, timings, refusals)
 
     def manifest(self) -> dict[str, Any]:
         """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""

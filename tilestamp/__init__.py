@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tilestamp.models.errors import TilestampError
     from tilestamp.models.machine import Machine, altered, list_machines, load_machine
+    from tilestamp.simulator.prices import Prices, variants
     from tilestamp.simulator.run import Run
     from tilestamp.simulator.scenes import LookAt, ModelToClip, Scene, list_scenes, load_scene
     from tilestamp.simulator.simulation import simulate
@@ -21,6 +22,7 @@ _HOMES = {
     "LookAt": "simulator.scenes",
     "Machine": "models.machine",
     "ModelToClip": "simulator.scenes",
+    "Prices": "simulator.prices",
     "Run": "simulator.run",
     "Scene": "simulator.scenes",
     "TilestampError": "models.errors",
@@ -30,12 +32,14 @@ _HOMES = {
     "load_machine": "models.machine",
     "load_scene": "simulator.scenes",
     "simulate": "simulator.simulation",
+    "variants": "simulator.prices",
 }
 
 __all__ = [
     "LookAt",
     "Machine",
     "ModelToClip",
+    "Prices",
     "Run",
     "Scene",
     "TilestampError",
@@ -45,6 +49,7 @@ __all__ = [
     "load_machine",
     "load_scene",
     "simulate",
+    "variants",
 ]
 
 

@@ -1,0 +1,115 @@
+"""Prices: what one run takes on many machines, an array row a machine, a column a launch."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.models.timing import Timing
+from tilestamp.simulator.work import FixedFunctionWork, Work
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Machines = Iterable[Machine | str | Path] | Mapping[str, ArrayLike]
+
+
+@dataclass(frozen=True)
+class Prices:
+    """Times of one run on many machines.
+
+    Parameters
+    ----------
+    machines : tuple of Machine
+    stages, kernels : tuple of str
+        Of each launch, in launch order.
+    milliseconds, low, high : ndarray, (machines, launches), float64
+        Time of each launch and its spread (``tilestamp.models.timing``); NaN on a machine that was refused.
+    bounds : ndarray, (machines, launches), str
+        The term that holds; ``""`` on a machine that was refused.
+    refusals : dict of int to str
+        By place among ``machines``: why the run has no price there.
+    """
+
+    machines: tuple[Machine, ...]
+    stages: tuple[str, ...]
+    kernels: tuple[str, ...]
+    milliseconds: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    bounds: NDArray[np.str_]
+    refusals: dict[int, str] = field(default_factory=dict)
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """Milliseconds of the frame on each machine, (machines,), float64: its launches one after another."""
+        total: NDArray[np.float64] = self.milliseconds.sum(axis=1)
+        return total
+
+    def table(self) -> "pd.DataFrame":
+        """Tidy table: a row for each machine (by place) and stage, in milliseconds."""
+        import pandas as pd
+
+        names = list(dict.fromkeys(self.stages))
+        member = np.array([[stage == name for name in names] for stage in self.stages], dtype=np.float64)
+        rows: dict[str, NDArray[np.generic]] = {"machine": np.repeat(np.arange(len(self.machines)), len(names))}
+        rows["stage"] = np.tile(np.array(names, dtype=object), len(self.machines))
+        for column, values in (("milliseconds", self.milliseconds), ("low", self.low), ("high", self.high)):
+            rows[column] = (values @ member.reshape(len(self.stages), len(names))).ravel()
+        return pd.DataFrame(rows)
+
+
+def variants(machine: Machine, numbers: Mapping[str, ArrayLike]) -> list[Machine]:
+    """Machines that differ from one in some numbers.
+
+    Parameters
+    ----------
+    machine : Machine
+    numbers : mapping of str to array, (machines,)
+        By dotted name (``sm.clock_mhz``); a DataFrame with such columns will do. A lone number is that of all.
+
+    Raises
+    ------
+    TilestampError
+        Columns of unequal length, or what ``altered`` refuses.
+    """
+    columns = {key: np.atleast_1d(np.asarray(column)) for key, column in numbers.items()}
+    lengths = {len(column) for column in columns.values()} - {1}
+    if len(lengths) > 1 or any(column.ndim != 1 for column in columns.values()):
+        told = ", ".join(f"{key} {column.shape}" for key, column in columns.items())
+        raise TilestampError(f"numbers of many machines need one length, not {told}")
+    rows = zip(*np.broadcast_arrays(*columns.values()), strict=True) if columns else ()
+    return [altered(machine, dict(zip(columns, row, strict=True))) for row in rows]
+
+
+def machines_of(machines: Machines, base: Machine) -> list[Machine]:
+    """Machines as ``Run.prices`` takes them."""
+    if isinstance(machines, Mapping) or hasattr(machines, "columns"):
+        return variants(base, machines)  # type: ignore[arg-type]  # a DataFrame has items, as a mapping
+    if isinstance(machines, Machine | str | Path):
+        return [load_machine(machines)]
+    return [load_machine(machine) for machine in machines]
+
+
+def stacked(
+    machines: Sequence[Machine],
+    works: Sequence[Work | FixedFunctionWork],
+    timings: Sequence[Sequence[Timing]],
+    refusals: dict[int, str],
+) -> Prices:
+    """Put the timings of all machines together; none where one was refused."""
+    shape = len(machines), len(works)
+    times = np.full((3, *shape), np.nan)
+    bounds = np.full(shape, "", dtype="U32")
+    for place, row in enumerate(timings):
+        for launch, timing in enumerate(row):
+            times[:, place, launch] = timing.milliseconds, timing.low, timing.high
+            bounds[place, launch] = timing.bound
+    stages, kernels = tuple(work.stage for work in works), tuple(work.kernel for work in works)
+    milliseconds, low, high = times
+    return Prices(tuple(machines), stages, kernels, milliseconds, low, high, bounds, refusals)

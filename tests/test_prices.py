@@ -1,0 +1,64 @@
+"""Prices of one run on many machines: each is that of one machine, and what no machine can price is said."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tilestamp import TilestampError, altered, load_machine, simulate, variants
+
+SMALL = {"width": 96, "height": 72}
+NUMBERS = {"sm.clock_mhz": [900.0, 1500.0, 1500.0], "memory.dram_gb_per_s": [100.0, 100.0, 200.0]}
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate("teapot", "micropolygon", "h200", **SMALL)
+
+
+def test_prices_are_those_of_one_machine_at_a_time(run):
+    machines = ["h200", "a100", altered(run.machine, {"sm.clock_mhz": 1000.0})]
+    got = run.prices(machines)
+    for place, machine in enumerate(machines):
+        timings = run.on(machine).timings
+        for name in ("milliseconds", "low", "high"):
+            assert getattr(got, name)[place].tolist() == [getattr(timing, name) for timing in timings]
+        assert got.bounds[place].tolist() == [timing.bound for timing in timings]
+        assert got.frame[place] == pytest.approx(run.on(machine).milliseconds, rel=1e-14)
+    assert got.kernels == tuple(timing.kernel for timing in run.timings)
+
+
+@pytest.mark.parametrize("numbers", [NUMBERS, pd.DataFrame(NUMBERS)])
+def test_numbers_of_many_machines_are_taken_as_columns(run, numbers):
+    got = run.prices(numbers)
+    assert [machine.sm.clock_mhz for machine in got.machines] == NUMBERS["sm.clock_mhz"]
+    assert got.frame.tolist() == run.prices(variants(run.machine, NUMBERS)).frame.tolist()
+
+
+def test_a_lone_number_is_that_of_all_machines(run):
+    machines = variants(run.machine, NUMBERS | {"memory.l2_bytes": 10**6})
+    assert [machine.memory.l2_bytes for machine in machines] == [10**6] * 3
+
+
+def test_columns_of_unequal_length_are_refused(run):
+    with pytest.raises(TilestampError, match=r"one length, not sm.clock_mhz \(3,\), sm.count \(2,\)"):
+        variants(run.machine, {"sm.clock_mhz": [1.0, 2.0, 3.0], "sm.count": [1, 2]})
+
+
+def test_a_table_has_a_row_for_each_machine_and_stage(run):
+    got = run.prices(["h200", "a100"])
+    table = got.table()
+    assert len(table) == 2 * len(set(got.stages))
+    assert table[table.machine == 0].set_index("stage").milliseconds.tolist() == pytest.approx(
+        run.stages["milliseconds"].tolist()
+    )
+
+
+def test_a_machine_without_a_price_is_refused_or_skipped(run):
+    machines = [altered(run.machine, {"sm.max_threads_per_block": 32}), load_machine("gtx280"), run.machine]
+    with pytest.raises(TilestampError, match="launches at most 32 threads"):
+        run.prices(machines)
+    got = run.prices(machines, skip=True)
+    assert list(got.refusals) == [0, 1]
+    assert "simulate again on it" in got.refusals[1]
+    assert np.isnan(got.frame[:2]).all()
+    assert got.frame[2] == pytest.approx(run.milliseconds)
