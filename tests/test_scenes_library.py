@@ -11,10 +11,11 @@ from tests import naive_scenes
 from tests.test_scenes_bpt import write as write_bpt
 from tests.test_scenes_meshes import SQUARE
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator import simulate
 from tilestamp.simulator.scenes import Scene, list_scenes, load_scene
 from tilestamp.simulator.scenes.library import bounds, scene_or_stand_in, stand_in
 from tilestamp.simulator.scenes.search_path import SCENES_VARIABLE, find_scene
-from tilestamp.simulator.scenes.subpatches import split_to_count, tessellate, with_mesh
+from tilestamp.simulator.scenes.subpatches import cut, edge_lengths, tessellate, with_mesh
 
 
 @pytest.fixture
@@ -116,9 +117,20 @@ def test_a_stand_in_has_the_models_views_and_fits_them(name, shared):
 
 
 @pytest.mark.parametrize("name", ["bigguy", "killeroo"])
-def test_a_stand_in_is_nine_tenths_as_large_as_the_model(name, shared):
-    sizes = [np.linalg.norm(np.ptp(bounds(scene), axis=0)) for scene in (load_scene(name), stand_in(name))]
-    assert sizes[1] == pytest.approx(0.9 * sizes[0], rel=1e-2)
+def test_a_stand_ins_patches_are_as_long_and_as_slender_as_the_models(name, shared):
+    real, other = (np.sort(edge_lengths(scene.patches), axis=1) for scene in (load_scene(name), stand_in(name)))
+    scale = np.sqrt(real.prod(axis=1).sum() / other.prod(axis=1).sum())  # its surface is a little larger
+    np.testing.assert_allclose(np.median(scale * other, axis=0), np.median(real, axis=0), rtol=0.25)
+    assert np.median(other[:, 1] / other[:, 0]) == pytest.approx(np.median(real[:, 1] / real[:, 0]), rel=0.2)
+
+
+@pytest.mark.parametrize("bound", [4, 8])
+def test_a_frame_of_the_killeroos_stand_in_takes_as_long_as_the_killeroos(bound, shared):
+    real, other = (
+        simulate(scene, "micropolygon", "gtx280", width=1600, height=1200, bound=bound).milliseconds
+        for scene in (load_scene("killeroo"), stand_in("killeroo"))
+    )
+    assert other == pytest.approx(real, rel=0.05)
 
 
 def test_there_is_no_stand_in_for_other_models():
@@ -127,9 +139,9 @@ def test_there_is_no_stand_in_for_other_models():
 
 
 def test_splitting_leaves_the_surface_alone():
-    """The first patch, cut in four by u first: each quarter's middle is a point of the whole."""
+    """The first patch, cut in four, row by row: each quarter's middle is a point of the whole."""
     teapot = load_scene("teapot").patches
-    quarters = split_to_count(teapot, 128).points.reshape(-1, 4, 4, 4)[:4].astype(float)
+    quarters = cut(teapot, 2, 2).points.reshape(-1, 4, 4, 4)[:4].astype(float)
     whole = teapot.points.reshape(-1, 4, 4, 4)[0].astype(float)
     middle = naive_scenes.bernstein(0.5)
     for quarter, (u, v) in zip(quarters, [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)], strict=True):
@@ -137,14 +149,18 @@ def test_splitting_leaves_the_surface_alone():
         np.testing.assert_allclose(naive_scenes.surface_point(quarter, middle, middle), wanted, atol=1e-6)
 
 
-@pytest.mark.parametrize("count", [32, 33, 34, 35, 127, 128, 131])
-def test_any_larger_count_can_be_reached(count):
-    assert len(split_to_count(load_scene("teapot").patches, count).points) == count
+def test_parts_stand_in_the_place_of_their_patch():
+    teapot = load_scene("teapot").patches
+    along_u, along_v = 1 + np.arange(32) % 3, 1 + np.arange(32) % 2
+    parts = cut(teapot, along_u, along_v).points
+    first = np.concatenate([[0], np.cumsum(along_u * along_v)])
+    np.testing.assert_allclose(parts[first[:-1], 0], teapot.points[:, 0], atol=1e-6)
+    np.testing.assert_allclose(parts[first[1:] - 1, 15], teapot.points[:, 15], atol=1e-6)
 
 
-def test_patches_cannot_become_fewer():
-    with pytest.raises(TilestampError, match="32 patches cannot be split into 31"):
-        split_to_count(load_scene("teapot").patches, 31)
+def test_a_patch_cannot_be_cut_into_no_parts():
+    with pytest.raises(TilestampError, match="fewer parts than one"):
+        cut(load_scene("teapot").patches, 0)
 
 
 def test_a_tessellation_lies_on_the_surface():
@@ -250,23 +266,12 @@ def test_importing_scenes_brings_in_nothing_slow():
     assert done.stdout == "[]\n"
 
 
-def test_a_patch_in_three_parts_covers_the_whole():
-    """A half, and the two quarters beside it: their outer corners are those of the patch."""
-    teapot = load_scene("teapot").patches
-    parts = split_to_count(teapot, 34).points
-    cut = next(i for i in range(32) if not np.array_equal(parts[i], teapot.points[i]))
-    half, below, above = parts[cut : cut + 3]
-    whole = teapot.points[cut]
-    np.testing.assert_allclose([half[0], half[12], below[3], above[15]], whole[[0, 12, 3, 15]], atol=1e-6)
-    np.testing.assert_allclose(below[12:], above[:4], atol=1e-6)
-
-
 def test_the_measured_cameras_were_made_for_the_embedded_teapot(shared):
     """In the fourth queue pass of the 1600x1200 frame exactly two sub-patches are under 4 pixels."""
     from tilestamp.simulator.scenes import read_camera
 
     camera = read_camera(f"{shared / 'silicon' / 'micropolygon_cameras.json'}:teapot_1600x1200_bb4")
-    nets = split_to_count(load_scene("teapot").patches, 2048).points.astype(np.float64)
+    nets = cut(load_scene("teapot").patches, 8, 8).points.astype(np.float64)
     clip = nets @ camera.matrix(1600, 1200).T
     pixels = clip[..., :2] / clip[..., 3:] * [800, 600]
     assert int((np.ptp(pixels, axis=1) < 4).all(axis=1).sum()) == 2

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,8 @@ from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
 from tilestamp.simulator.scenes.quad_cage import cage_of
 from tilestamp.simulator.scenes.scene import Patches, Scene, clip_space_scene
 from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
-from tilestamp.simulator.scenes.subpatches import split_to_count, with_mesh
+from tilestamp.simulator.scenes.stand_ins import NOT_SHIPPED, cut_like
+from tilestamp.simulator.scenes.subpatches import with_mesh
 from tilestamp.simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
@@ -32,23 +33,10 @@ EMBEDDED = {
 }
 
 
-class Absent(NamedTuple):
-    """A model of the papers that is not shipped; its middle is the origin."""
-
-    patches: int
-    line: str
-    diagonal: float  # of its box, in model units
-
-
-NOT_SHIPPED = {
-    "bigguy": Absent(3570, "Bay Raitt's big guy, 3570 patches", 9.117),
-    "killeroo": Absent(11532, "headus's killeroo, 11532 patches", 6.688),
-}
 LARGE_BYTES, LARGE_TIMES = 2**25, 10  # memory above both (bytes; times the file) is worth a note
 CAGE_BYTES = 1400  # a patch, while a cage becomes patches; measured
 STAND_IN = "stand-in for "  # first words of its name
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
-STAND_IN_SIZE = 0.9  # diagonal of its box over the model's: the cow is stouter, and must lie inside the same views
 
 
 def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: Kind = None) -> Scene:
@@ -103,10 +91,7 @@ def list_scenes(scene_path: SearchPath = None) -> list[tuple[str, str]]:
 
 
 def stand_in(name: str) -> Scene:
-    """Give as many patches as a model that is not here has, cut from the embedded cage; its note says so.
-
-    They are turned and scaled into the model's place, so that the model's views show them about as large.
-    """
+    """Give as many patches as a model that is not here has, and of its sizes (``stand_ins``); its note says so."""
     if name not in NOT_SHIPPED:
         raise TilestampError(f"there is no stand-in for {name!r}, only for {' and '.join(NOT_SHIPPED)}")
     model = NOT_SHIPPED[name]
@@ -114,10 +99,9 @@ def stand_in(name: str) -> Scene:
     if cow.patches is None:
         raise TilestampError("the embedded cage is damaged: reinstall")
     low, high = bounds(cow)
-    scale = STAND_IN_SIZE * model.diagonal / float(np.linalg.norm(high - low))
     turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if name in Z_UP else np.eye(3)
-    points = split_to_count(cow.patches, model.patches).points.astype(np.float64)
-    points[..., :3] = (points[..., :3] - points[..., 3:] * (low + high) / 2.0) @ (scale * turn).T
+    points = cut_like(cow.patches, model).points.astype(np.float64)
+    points[..., :3] = (points[..., :3] - points[..., 3:] * (low + high) / 2.0) @ (model.scale * turn).T
     note = (
         f"stand-in: {model.patches} patches cut from the embedded spot, because {name} ({model.line}) is not here;"
         f" put {name}.bpt on the scene search path (TILESTAMP_SCENES)"

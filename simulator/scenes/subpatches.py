@@ -1,5 +1,6 @@
 """Cut patches into smaller patches, and into triangles."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -8,33 +9,50 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.scene import Mesh, Patches, Scene
 
-# De Casteljau at one half: the control points of the first half of a cubic; the second half is its mirror image.
-FIRST_HALF = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
-SECOND_HALF = FIRST_HALF[::-1, ::-1]
-
 MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
 FINEST_TESSELLATION = 16  # quads along a patch
 
 Nets = NDArray[np.float64]
 
 
-def split_to_count(patches: Patches, count: int) -> Patches:
-    """Split patches, the largest first, until there are exactly ``count``; the surface stays the same.
+def cut(patches: Patches, along_u: NDArray[np.int64] | int, along_v: NDArray[np.int64] | int = 1) -> Patches:
+    """Cut each patch into parts of equal parameter range; the surface stays the same.
 
-    Every patch is cut in four as often as ``count`` allows, then the largest in four again, then one in two or three.
-    The pieces of a patch stay together, in the patch's place.
+    Parameters
+    ----------
+    patches : Patches
+        P of them.
+    along_u, along_v : int or ndarray, (P,) int64
+        Parts of each patch, at least one each way; u is along the rows of its net.
+
+    Returns
+    -------
+    Patches
+        The parts of a patch stand in its place, row by row.
+
+    Source: Ramshaw, blossoming: a part's control points are the polar form at its ends.
     """
     nets = patches.points.astype(np.float64).reshape(-1, 4, 4, 4)
-    if not 0 < len(nets) <= count:
-        raise TilestampError(f"{len(nets)} patches cannot be split into {count}")
-    while 4 * len(nets) <= count:
-        nets = _split(nets, np.full(len(nets), 4))
-    quartered, rest = divmod(count - len(nets), 3)
-    by_size = np.argsort(-_sizes(nets), kind="stable")
-    parts = np.ones(len(nets), dtype=np.int64)
-    parts[by_size[:quartered]] = 4
-    parts[by_size[quartered : quartered + 1]] += rest
-    return Patches(_split(nets, parts).reshape(-1, 16, 4).astype(np.float32))
+    across, down = (np.broadcast_to(np.asarray(parts, dtype=np.int64), len(nets)) for parts in (along_u, along_v))
+    if min(across.min(initial=1), down.min(initial=1)) < 1:
+        raise TilestampError("a patch cannot be cut into fewer parts than one")
+    first = np.concatenate([[0], np.cumsum(across * down)])
+    pieces = np.empty((first[-1], 16, 4))
+    for u, v in np.unique(np.stack([across, down], axis=1), axis=0):
+        alike = np.flatnonzero((across == u) & (down == v))
+        parts = np.einsum(
+            "bri,acj,pijk->pbarck", _parts_of_a_cubic(v), _parts_of_a_cubic(u), nets[alike], optimize=True
+        )
+        pieces[first[alike, None] + np.arange(u * v)] = parts.reshape(len(alike), u * v, 16, 4)
+    return Patches(pieces.astype(np.float32))
+
+
+def edge_lengths(patches: Patches) -> NDArray[np.float64]:
+    """Mean length of each patch's control polygons along u and v, (P, 2)."""
+    points = patches.points.astype(np.float64).reshape(-1, 4, 4, 4)
+    points = points[..., :3] / points[..., 3:]
+    steps = (np.linalg.norm(np.diff(points, axis=axis), axis=-1).sum(axis=axis).mean(axis=1) for axis in (2, 1))
+    return np.stack(list(steps), axis=1)
 
 
 def with_mesh(scene: Scene) -> Scene:
@@ -75,22 +93,15 @@ def tessellate(patches: Patches, cells: int) -> Mesh:
     )
 
 
-def _split(nets: Nets, parts: NDArray[np.int64]) -> Nets:
-    """Cut each patch into 1, 2 (along u), 3 (a half and two quarters) or 4 parts (u first), in place."""
-    first, second = (np.einsum("ij,prjk->prik", half, nets) for half in (FIRST_HALF, SECOND_HALF))
-    quarters = [
-        np.einsum("ij,pjck->pick", half, side) for half in (FIRST_HALF, SECOND_HALF) for side in (first, second)
-    ]
-    pieces = np.stack(quarters, axis=1)
-    pieces[parts == 1, 0] = nets[parts == 1]
-    pieces[parts == 2, 0], pieces[parts == 2, 1] = first[parts == 2], second[parts == 2]
-    pieces[parts == 3, 0], pieces[parts == 3, 2] = first[parts == 3], pieces[parts == 3, 3]
-    kept: Nets = pieces[np.arange(4) < parts[:, None]]
-    return kept
+def _parts_of_a_cubic(parts: int) -> NDArray[np.float64]:
+    """Give the control points of each part as weights of those of the whole, (parts, 4, 4)."""
+    ends = np.linspace(0.0, 1.0, parts + 1)
+    return np.array([[_polar([a] * (3 - i) + [b] * i) for i in range(4)] for a, b in itertools.pairwise(ends)])
 
 
-def _sizes(nets: Nets) -> NDArray[np.float64]:
-    """Diagonal of the box around each patch's control points, (P,)."""
-    points = (nets[..., :3] / nets[..., 3:]).reshape(len(nets), 16, 3)
-    diagonal: NDArray[np.float64] = np.linalg.norm(np.ptp(points, axis=1), axis=1)
-    return diagonal
+def _polar(at: list[float]) -> NDArray[np.float64]:
+    """Weights of a cubic's control points in its polar form at three parameters, (4,)."""
+    weights = np.ones(1)
+    for t in at:
+        weights = np.convolve(weights, [1.0 - t, t])
+    return weights
