@@ -11,11 +11,11 @@ from tests import naive_scenes
 from tests.test_scenes_bpt import write as write_bpt
 from tests.test_scenes_meshes import SQUARE
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator import simulate
 from tilestamp.simulator.scenes import Scene, list_scenes, load_scene
 from tilestamp.simulator.scenes.library import bounds, scene_or_stand_in, stand_in
 from tilestamp.simulator.scenes.search_path import SCENES_VARIABLE, find_scene
 from tilestamp.simulator.scenes.subpatches import cut, edge_lengths, tessellate, with_mesh
+from tilestamp.simulator.simulation import simulate
 
 
 @pytest.fixture
