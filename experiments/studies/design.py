@@ -79,37 +79,37 @@ class Design:
     @cached_property
     def factors(self) -> list[Factor]:
         """Lists of choices, whose product are the cells."""
-        pipelines = self._pipelines()
         parts: list[tuple[tuple[str, ...], Factor]] = [
-            (("grid", name), factor) for name, factor in self._choices("grid", self.grid, pipelines).items()
+            (("grid", name), factor) for name, factor in self._choices("grid", self.grid).items()
         ]
         if self.zip:
             with place("zip"):
-                parts.append((("zip",), zipped(self._choices("zip", self.zip, pipelines))))
+                parts.append((("zip",), zipped(self._choices("zip", self.zip))))
         if self.sample is not None:
-            parts.append((("sample",), self._sampled(pipelines)))
+            parts.append((("sample",), self._sampled()))
         _check_apart(parts)
         for where, factor in parts:
-            _check_names(where, factor, pipelines)
-        _check_names(("fixed",), [Choice({}, dict(self.fixed))], pipelines)
+            _check_names(where, factor, self.pipelines)
+        _check_names(("fixed",), [Choice({}, dict(self.fixed))], self.pipelines)
         return [factor for _, factor in parts]
 
-    def _choices(self, table: str, axes: Mapping[str, Axis], pipelines: Sequence[str]) -> dict[str, Factor]:
+    def _choices(self, table: str, axes: Mapping[str, Axis]) -> dict[str, Factor]:
         found = {}
         for name, axis in axes.items():
             with place(table, name):
-                found[name] = choices(name, axis, whole=is_whole(name, pipelines))
+                found[name] = choices(name, axis, whole=is_whole(name, self.pipelines))
         return found
 
-    def _sampled(self, pipelines: Sequence[str]) -> Factor:
+    def _sampled(self) -> Factor:
         with place("sample"):
             try:
                 sample = msgspec.convert(self.sample, Sample)
             except msgspec.ValidationError as error:
                 raise TilestampError(str(error).replace("`", "")) from error
-            return sampled(sample, {name: is_whole(name, pipelines) for name in sample.axes})
+            return sampled(sample, {name: is_whole(name, self.pipelines) for name in sample.axes})
 
-    def _pipelines(self) -> list[str]:
+    @cached_property
+    def pipelines(self) -> list[str]:
         """Pipelines that are named anywhere, and the one where none is."""
         sample = self.sample.axes if isinstance(self.sample, Sample) else (self.sample or {}).get("axes", {})
         axes: dict[str, Any] = {**self.grid, **self.zip, **sample}

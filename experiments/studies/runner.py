@@ -7,17 +7,17 @@ from itertools import islice
 
 from tilestamp.experiments.harness.pool import Pool, pool
 from tilestamp.experiments.studies.axes import shown
-from tilestamp.experiments.studies.cells import candidates, missing
+from tilestamp.experiments.studies.cells import candidates, missing, rows
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.forecast import MOST_LISTED, Forecast, duration, forecast_of
 from tilestamp.experiments.studies.forecast import forecast as forecast_study
+from tilestamp.experiments.studies.names import Names
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.plan import Group
 from tilestamp.experiments.studies.question import may_be_best
 from tilestamp.experiments.studies.values import PRICED, SHARED
 from tilestamp.experiments.studies.work import Outcome, Task, perform
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.nearest_name import did_you_mean
 
 WINDOW = 10_000  # groups that are listed at once
 FEWEST = 25  # cells of a group that is taken apart, so that all processes have work
@@ -97,7 +97,8 @@ class _Runner:
         self.study, self.workers, self.summary, self.todo = study, workers, summary, todo
         self._say = say
         self._begin = self._said = time.perf_counter()
-        self._lacking: dict[str, set[str]] | None = None  # recorded names that no cell has, with all that one has
+        self._executed = 0.0  # seconds
+        self._names = Names(study.record, study.pipelines, lambda: (stored.numbers for _, stored in rows(study)))
 
     def run(self, groups: Iterable[Group]) -> None:
         """Run some groups."""
@@ -109,7 +110,6 @@ class _Runner:
             ]
             for outcome in self.workers.map(perform, tasks):
                 self._store(window[outcome.number], outcome)
-        self._check_names()
 
     def _split(self, groups: Iterable[Group]) -> Iterator[Group]:
         """Take large groups apart where there are several workers and few groups."""
@@ -124,34 +124,29 @@ class _Runner:
         if outcome.ending:
             raise TilestampError(outcome.ending)
         study, execution = self.study, group.execution
-        for cell, values, problem, fault in zip(
-            group.cells, outcome.values, outcome.problems, outcome.faults, strict=True
-        ):
-            if fault:
-                self.summary.faults.append(fault)
+        for cell, result in zip(group.cells, outcome.results, strict=True):
+            if result.fault:
+                self.summary.faults.append(result.fault)
                 continue
             parameters = SHARED | PRICED | dict(study.fixed) | group.parameters | cell.shown | cell.pricing.changes
             parameters |= {"machine": cell.pricing.machine.name, "error": execution.error}
-            study.kept.put(
-                cell.key,
-                {name: shown(value) for name, value in parameters.items()},
-                study.record,
-                values or {},
-                problem,
-            )
+            told = {name: shown(value) for name, value in parameters.items()}
+            study.kept.put(cell.key, told, study.record, result.values or {}, result.problem)
             self.summary.new += 1
-            self.summary.problems += bool(problem)
+            self.summary.problems += bool(result.problem)
         self._account(group, outcome)
-        self._note_names(outcome)
+        done = [result.values for result in outcome.results if result.values is not None]
+        if done:
+            self._names.saw(execution.pipeline, done, outcome.known)
 
     def _account(self, group: Group, outcome: Outcome) -> None:
         """Add up what was done and saved, and say how far it is."""
         summary, execution = self.summary, group.execution
-        times = outcome.executions, outcome.execution_seconds, len(outcome.values), outcome.pricing_seconds
+        times = outcome.executions, outcome.execution_seconds, len(outcome.results), outcome.pricing_seconds
         self.study.kept.note_times(execution.pipeline, execution.width * execution.height, *times)
         summary.executions += outcome.executions
-        summary.saved_executions += len(outcome.values) - outcome.executions
-        self._executed = getattr(self, "_executed", 0.0) + outcome.execution_seconds
+        summary.saved_executions += len(outcome.results) - outcome.executions
+        self._executed += outcome.execution_seconds
         if summary.executions:
             summary.saved_seconds = summary.saved_executions * self._executed / summary.executions
         now = time.perf_counter()
@@ -159,25 +154,3 @@ class _Runner:
             self._said = now
             left = (now - self._begin) / summary.new * (self.todo - summary.new) if summary.new else 0.0
             self._say(f"{summary.new:,} of {self.todo:,} cells, about {duration(left)} left")
-
-    def _note_names(self, outcome: Outcome) -> None:
-        """Keep which recorded names no cell had so far."""
-        for values in outcome.values:
-            if values is None:
-                continue
-            lacking = {name for name, value in values.items() if value is None}
-            lacking |= {
-                name
-                for name in self.study.record
-                if name.startswith("*.") and not any(key.endswith(name[1:]) for key in values)
-            }
-            known = set(outcome.known)
-            before = self._lacking
-            self._lacking = {
-                name: known | (before or {}).get(name, set()) for name in lacking if before is None or name in before
-            }
-
-    def _check_names(self) -> None:
-        """Refuse what no cell has: a slip."""
-        for name, known in (self._lacking or {}).items():
-            raise TilestampError(f"record: no cell has {name}{did_you_mean(name, known)}; what was computed is stored")

@@ -7,6 +7,7 @@ problem, and is stored; what is wrong with the worker itself ends the study with
 import time
 import traceback
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine
 from tilestamp.models.price import Fidelity
 from tilestamp.simulator.manifest import scene_digest
+from tilestamp.simulator.prices import Prices
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import ModelToClip, Scene, load_scene
 from tilestamp.simulator.simulation import simulate
@@ -36,14 +38,21 @@ class Task(NamedTuple):
     record: tuple[str, ...]
 
 
+class Result(NamedTuple):
+    """What came of a cell: its values, or its problem, or (an error of ours) its fault."""
+
+    values: dict[str, Number] | None = None
+    problem: str = ""
+    fault: str = ""
+
+
 @dataclass
 class Outcome:
-    """What came of a task: for each cell its values, or its problem, or (an error of ours) its fault."""
+    """What came of a task."""
 
     number: int
-    values: list[dict[str, Number] | None] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
+    results: list[Result] = field(default_factory=list)
+    """Of each pricing."""
     executions: int = 0
     execution_seconds: float = 0.0
     pricing_seconds: float = 0.0
@@ -62,40 +71,81 @@ def perform(task: Task) -> Outcome:
         outcome.ending = str(error)
         return outcome
     begin = time.perf_counter()
-    for pricing in task.pricings:
-        values, problem, fault = None, "", ""
-        try:
-            values = _priced(task, pricing, scene, outcome)
-        except TilestampError as error:
-            problem = str(error)
-        except Exception as error:  # noqa: BLE001 - one cell's fault ends no other
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            fault = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-        outcome.values.append(values)
-        outcome.problems.append(problem)
-        outcome.faults.append(fault)
+    worker = _Worker(task, scene, outcome)
+    worker.price()
+    outcome.results = [worker.results[place] for place in range(len(task.pricings))]
     outcome.pricing_seconds = time.perf_counter() - begin - outcome.execution_seconds
     return outcome
 
 
-def prices(run: Run, machines: Sequence[tuple[Machine, Fidelity]]) -> Iterator[Run]:
+def prices(run: Run, machines: Sequence[Machine], fidelity: Fidelity) -> Prices:
     """Price one run on many machines."""
-    for machine, fidelity in machines:
-        yield run.on(machine, fidelity)
+    return run.on(run.machine, fidelity).prices(machines, skip=True)
 
 
-def _priced(task: Task, pricing: Pricing, scene: Scene, outcome: Outcome) -> dict[str, Number]:
-    """Values of one cell."""
-    machine = pricing.altered()
-    run = next(prices(_run(task.execution, machine, scene, outcome), [(machine, pricing.fidelity)]))
-    if run.sampled and run.error and run.milliseconds_interval.relative > run.error:  # sampled for another machine
-        run = _executed(task.execution, machine, scene, outcome)
-        run = next(prices(run, [(machine, pricing.fidelity)]))
-    recorded = Recorded(run)
-    values = recorded.values(task.record)
-    if None in values.values() and not outcome.known:
-        outcome.known = recorded.known()
-    return values
+class _Worker:
+    """One task at work."""
+
+    def __init__(self, task: Task, scene: Scene, outcome: Outcome) -> None:
+        self.task, self.scene, self.outcome = task, scene, outcome
+        self.results: dict[int, Result] = {}
+
+    def price(self) -> None:
+        """Give each pricing its result."""
+        groups: dict[Fidelity, dict[int, Machine]] = {}
+        for place, pricing in enumerate(self.task.pricings):
+            with self._said(place):
+                groups.setdefault(pricing.fidelity, {})[place] = pricing.altered()
+        for fidelity, machines in groups.items():
+            self._price(fidelity, machines)
+
+    def _price(self, fidelity: Fidelity, machines: dict[int, Machine]) -> None:
+        """Price on machines of one fidelity: execute on the first that can launch what is to be executed."""
+        run = None
+        for place, machine in machines.items():
+            with self._said(place):
+                run = _run(self.task.execution, machine, self.scene, self.outcome)
+                break
+        left = {place: machine for place, machine in machines.items() if place not in self.results}
+        if run is None or not left:
+            return
+        try:
+            priced = prices(run, list(left.values()), fidelity)
+        except Exception as error:  # noqa: BLE001 - as in _said
+            self.results |= dict.fromkeys(left, Result(fault=_fault(error)))
+            return
+        for row, place in enumerate(left):
+            with self._said(place):
+                self.results[place] = Result(self._recorded(run, priced, row, fidelity), priced.refusals.get(row, ""))
+
+    def _recorded(self, run: Run, priced: Prices, row: int, fidelity: Fidelity) -> dict[str, Number] | None:
+        """Values of one cell; a sample that was drawn for another machine, and does not do here, is drawn again."""
+        if row in priced.refusals:
+            return None
+        recorded = Recorded(run.on(run.machine, fidelity), priced, row)
+        if run.sampled and recorded.run.milliseconds_interval.relative > run.error:
+            machine = priced.machines[row]
+            run = _executed(self.task.execution, machine, self.scene, self.outcome)
+            recorded = Recorded(run.on(machine, fidelity), prices(run, [machine], fidelity), 0)
+        values = recorded.values(self.task.record)
+        if None in values.values() and not self.outcome.known:
+            self.outcome.known = recorded.known()
+        return values
+
+    @contextmanager
+    def _said(self, place: int) -> Iterator[None]:
+        """Keep what goes wrong as the result of a cell: one cell's fault ends no other."""
+        try:
+            yield
+        except TilestampError as error:
+            self.results[place] = Result(problem=str(error))
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            self.results[place] = Result(fault=_fault(error))
+
+
+def _fault(error: Exception) -> str:
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
 
 
 def _run(execution: Execution, machine: Machine, scene: Scene, outcome: Outcome) -> Run:
