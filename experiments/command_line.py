@@ -76,6 +76,7 @@ def _app(arguments: list[str]) -> "App":
     from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
     from tilestamp.experiments.commands.render import PIPELINE, render
     from tilestamp.experiments.commands.reproduce import reproduce
+    from tilestamp.experiments.commands.study import study
     from tilestamp.experiments.commands.validate import validate
 
     app = App(
@@ -87,7 +88,7 @@ def _app(arguments: list[str]) -> "App":
     )
     draws = arguments[:1] == ["render"]
     app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
-    for command in (reproduce, validate, measure_machine):
+    for command in (study, reproduce, validate, measure_machine):
         app.command(command)
     app.command(catalogue, name="list")
     return app

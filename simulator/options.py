@@ -11,7 +11,7 @@ import os
 import textwrap
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -30,6 +30,9 @@ LARGEST = float(np.finfo(np.float32).max)
 
 class Options(msgspec.Struct, frozen=True, kw_only=True):
     """Values of all options, checked: whole floats and NumPy's scalars have become what the field says."""
+
+    persistent: ClassVar[bool] = False
+    """Whether a kernel launches as many blocks as there are SMs, which then share out the work by a queue."""
 
     def __post_init__(self) -> None:
         for field in msgspec.structs.fields(self):

@@ -9,6 +9,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tilestamp.experiments.studies.study import Study
+    from tilestamp.experiments.studies.study_file import read_study
     from tilestamp.models.errors import TilestampError
     from tilestamp.models.machine import Machine, altered, list_machines, load_machine
     from tilestamp.simulator.prices import Prices, variants
@@ -25,12 +27,14 @@ _HOMES = {
     "Prices": "simulator.prices",
     "Run": "simulator.run",
     "Scene": "simulator.scenes",
+    "Study": "experiments.studies.study",
     "TilestampError": "models.errors",
     "altered": "models.machine",
     "list_machines": "models.machine",
     "list_scenes": "simulator.scenes",
     "load_machine": "models.machine",
     "load_scene": "simulator.scenes",
+    "read_study": "experiments.studies.study_file",
     "simulate": "simulator.simulation",
     "variants": "simulator.prices",
 }
@@ -42,12 +46,14 @@ __all__ = [
     "Prices",
     "Run",
     "Scene",
+    "Study",
     "TilestampError",
     "altered",
     "list_machines",
     "list_scenes",
     "load_machine",
     "load_scene",
+    "read_study",
     "simulate",
     "variants",
 ]

@@ -2,4 +2,5 @@
 
 from tilestamp.experiments.command_line import main
 
-main()
+if __name__ == "__main__":  # processes that multiprocessing starts import it by another name
+    main()

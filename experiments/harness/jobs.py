@@ -5,7 +5,6 @@ Compiling kernels holds one core, so that two processes make the first run on tw
 
 import os
 import shutil
-import signal
 import socket
 import traceback
 from collections import deque
@@ -14,13 +13,13 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import chain, groupby
-from multiprocessing import resource_tracker
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Thread
 from typing import Any
 
 from tilestamp.experiments.harness.fit import run_judged
+from tilestamp.experiments.harness.pool import end_processes, unordered
 from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
 from tilestamp.experiments.harness.result import Figure, Outcome, Result
 from tilestamp.experiments.harness.write import SCRATCH, write_result
@@ -56,8 +55,7 @@ def run_experiments(
     Outcome
         As they come; results without their figures' functions, for all is drawn.
     """
-    from joblib import Parallel, delayed
-    from joblib.externals.loky import get_reusable_executor
+    from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     groups = [list(group) for _, group in groupby(names, key=(lambda name: name) if jobs == 1 else process_of)]
@@ -66,20 +64,14 @@ def run_experiments(
         with _listener(say) as address:
             told = say if jobs == 1 else partial(_send, address)
             tasks = [delayed(_run_all)(group, output, options, told) for group in groups]
-            resource_tracker.ensure_running()  # or joblib starts it in what follows, and it lets signals through
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers do not hear Ctrl-C: we end them
-            try:
-                finished = Parallel(jobs, return_as="generator_unordered")(tasks)
-            finally:
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-            for outcome in chain.from_iterable(finished):
+            for outcome in chain.from_iterable(unordered(tasks, jobs)):
                 del left[outcome.name]
                 yield outcome
     except TerminatedWorkerError:
         sentence = "a process that ran experiments ended before its time: out of memory? try -j 1"
         yield from (Outcome(name, failure=sentence) for name in left)
     finally:
-        get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+        end_processes()
         for scratch in output.glob(f"{SCRATCH}*"):
             shutil.rmtree(scratch, ignore_errors=True)
 

@@ -1,6 +1,6 @@
 """Across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009, without blur)."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
@@ -19,6 +19,7 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 class AcrossPolygonsOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Options of the pipeline across-polygons."""
 
+    persistent: ClassVar[bool] = True
     packing: Packing = "in-order"
     """How polygons come to lanes."""
 

@@ -1,6 +1,6 @@
 """Bit mask: samples that a patch has hit are not tested again by its later micropolygons (Yao et al. 2012)."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -22,6 +22,7 @@ from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask as filter_sampl
 class BitMaskOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Options of the pipeline bit-mask."""
 
+    persistent: ClassVar[bool] = True
     mask: MaskKind = "plain"
     """The paper's mask, one for each facing, or one that also looks at depth and is exact."""
     lanes: Annotated[int, Meta(ge=1)] | None = None

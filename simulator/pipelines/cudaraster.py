@@ -5,7 +5,7 @@ raster draws each 8x8 tile in shared memory.
 """
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -46,6 +46,7 @@ from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle
 class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline cudaraster."""
 
+    persistent: ClassVar[bool] = True
     release: Release = "1.1"
     """CudaRaster 1.1, or the copy in nvdiffrast."""
     msaa: Literal[1, 2, 4, 8] = 1

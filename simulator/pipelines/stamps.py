@@ -1,6 +1,6 @@
 """Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009)."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ Pair = Annotated[tuple[Pixels, ...], Meta(min_length=2, max_length=2)]  # tuple[
 class StampsOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Options of the pipeline stamps."""
 
+    persistent: ClassVar[bool] = True
     stamp: Pixels | Pair = 8
     """Pixels on a side of a stamp, or its width and height."""
     touch: Touch = "box"

@@ -1,0 +1,59 @@
+"""A study, as the library has it: its cells are forecast, run, and given as a table."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tilestamp.experiments.studies import cells, forecast, runner
+from tilestamp.experiments.studies.axes import Choice
+from tilestamp.experiments.studies.design import Design
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Study(Design):
+    """A design that can be run: see ``Design`` for its parameters."""
+
+    def forecast(self, jobs: int | None = None) -> forecast.Forecast:
+        """Say what a run would do: cells, executions, seconds."""
+        return forecast.forecast(self, jobs)
+
+    def run(
+        self, jobs: int | None = None, cluster: str | None = None, say: Callable[[str], None] = lambda _: None
+    ) -> runner.Summary:
+        """Run what is not stored.
+
+        Parameters
+        ----------
+        jobs : int, optional
+            Processes; as many as the forecast is worth if not given.
+        cluster : str, optional
+            ``local``, or a scheduler of dask.distributed, ``tcp://HOST:8786``.
+        say : callable
+            Told how far it is.
+
+        Raises
+        ------
+        TilestampError
+            What is wrong with the study, the store or the workers; what was stored is safe.
+        """
+        return runner.run(self, jobs, cluster, say)
+
+    def table(self) -> "pd.DataFrame":
+        """All cells of this study that are stored, in its order: a column an axis, a column a number."""
+        return cells.table(self)
+
+    def at(self, points: Sequence[Mapping[str, Any]], jobs: int | None = 1) -> "pd.DataFrame":
+        """Run cells that are no part of the axes, and give their rows, in order: for whoever searches, asks and tells.
+
+        Parameters
+        ----------
+        points : sequence of mappings
+            Parameters of each, beside what is fixed.
+        jobs : int, optional
+        """
+        asked = replace(self, grid={}, zip={}, sample=None, best="", store=self.kept)
+        asked.__dict__["factors"] = [[Choice(dict(point), dict(point)) for point in points]]
+        asked.run(jobs)
+        return asked.table()
