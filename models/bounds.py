@@ -4,11 +4,12 @@
 issue     schedulers and execution units, all SMs equally busy
 shared    passes through shared memory, all SMs equally busy
 l1        bytes between registers and the memory system, all SMs equally busy
-latency   Little's law: dependent chains of all units / units that are resident together
-dram, l2  bytes / bandwidth
-atomic    requests and conflicts / rate of all atomic units
-queue     requests at the fullest atomic unit: contention
 balance   where the blocks are fewer than the SMs: the fullest of issue, shared and l1 on the SMs that get any
+latency   Little's law: dependent chains of all units / units that are resident together
+dram, l2  bytes / bandwidth; stores may be slower than loads
+atomic    requests and conflicts / rate of all atomic units
+queue     requests at the fullest atomic unit: contention. Where atomics lock DRAM, a request that waits for its lock
+          holds up those behind it, so that the queue adds to ``atomic``; L2 units wait side by side with the rest
 start     blocks / block launch rate
 launch    overhead of the kernel
 ========  ===========================================================================================================
@@ -18,131 +19,132 @@ first requests reach them and end before the last answer is back, so a unit's ch
 that the units are many and alike; ``tilestamp.models.schedule`` does not.
 """
 
-from typing import NamedTuple
+from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
-from tilestamp.models.demand import Demand, demand
-from tilestamp.models.launch import Launch
-from tilestamp.models.machine import Machine
-from tilestamp.models.occupancy import Residency, residency
-from tilestamp.models.timing import Timing
-from tilestamp.models.traffic import Traffic
-
-SERVERS = ("dram", "l2", "atomic", "queue")  # of the whole chip
+from tilestamp.models.demand import Demand, atomic_rate
+from tilestamp.models.events import MachineEvent as E
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Shape
+from tilestamp.models.numbers import Number as M
 
 
-class Pricing(NamedTuple):
-    """A launch on a machine, and all that its time follows from."""
+class Term(IntEnum):
+    """What can limit a launch, in the order of reports."""
 
-    launch: Launch
-    machine: Machine
-    traffic: Traffic
-    residency: Residency
-    units: Demand
-    terms: dict[str, float]
+    ISSUE = 0
+    SHARED = 1
+    L1 = 2
+    BALANCE = 3
+    LATENCY = 4
+    DRAM = 5
+    L2 = 6
+    ATOMIC = 7
+    QUEUE = 8
+    START = 9
+    LAUNCH = 10  # on top of the largest of the others
 
 
-def pricing_of(launch: Launch, machine: Machine, traffic: Traffic) -> Pricing:
-    """Demands of the units and cycles of the terms.
+TAIL = Term.LAUNCH + 1  # what holds a schedule where no term does: the last units
+HOLDS = (*(term.name.lower() for term in Term), "tail")
+
+
+class Result(IntEnum):
+    """What pricing a launch gives, behind the cycles of its terms."""
+
+    CYCLES = 11  # of the whole launch; LOW and HIGH: ``Timing``
+    LOW = 12
+    HIGH = 13
+    BOUND = 14  # place in ``HOLDS`` of what holds
+    TAIL_CYCLES = 15  # from the start of the last unit to the end
+    BUSY_SMS = 16  # that got a unit
+
+
+COLUMNS = Result.BUSY_SMS + 1  # of terms and results
+
+
+class Fact(IntEnum):
+    """What of a launch differs from machine to machine and is no number of either."""
+
+    RESIDENT_BLOCKS = 0  # on an SM: ``models.occupancy``
+    DRAM_BYTES = 1  # ``models.traffic``
+    L2_BYTES = 2
+    LOAD_MISS = 3
+    WRITTEN_BYTES = 4
+    FULLEST_REQUESTS = 5  # of atomics, at the unit that gets most
+
+
+@kernel
+def places_of(launch: Shape, machine: Any, facts: Any) -> tuple[int, int]:
+    """Units that the machine holds together, and SMs that hold any: blocks are dealt to SMs one after another."""
+    sms = int(machine[M.SM_COUNT])
+    blocks = min(launch.grid, sms * int(facts[Fact.RESIDENT_BLOCKS]))
+    warps = 1 if launch.block_is_unit else -(-launch.block // int(machine[M.SM_WARP_SIZE]))
+    return blocks * warps, max(1, min(sms, blocks))
+
+
+@kernel
+def bound_terms(launch: Shape, units: Demand, totals: Any, machine: Any, facts: Any) -> Any:
+    """Cycles of each term, (len(Term),).
 
     Parameters
     ----------
-    launch : Launch
-    machine : Machine
-    traffic : Traffic
-        Its bytes, from ``tilestamp.models.traffic``.
-
-    Raises
-    ------
-    TilestampError
-        A block that the machine cannot launch.
+    launch : Shape
+    units : Demand
+    totals : ndarray, (len(MachineEvent),)
+        Events of all units.
+    machine : ndarray, (len(Number),)
+    facts : ndarray, (len(Fact),)
     """
-    resident = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    units = demand(launch, machine, traffic)
-    return Pricing(launch, machine, traffic, resident, units, bound_terms(launch, machine, units, resident))
+    terms = np.zeros(TAIL)
+    places, busy = places_of(launch, machine, facts)
+    sms = machine[M.SM_COUNT]
+    issue, shared, l1, chain = units.issue.sum(), units.shared.sum(), units.l1.sum(), units.chain.sum()
+    terms[Term.ISSUE], terms[Term.SHARED], terms[Term.L1] = issue / sms, shared / sms, l1 / sms
+    if min(busy, launch.units) < sms:
+        terms[Term.BALANCE] = max(max(issue, shared), l1) / max(1, min(busy, launch.units))
+    terms[Term.LATENCY] = chain / max(1, min(places, launch.units))
+    if launch.units:
+        _chip_terms(terms, totals, machine, facts)
+    if not launch.drawn:
+        terms[Term.START] = launch.grid / machine[M.LAUNCH_BLOCKS_PER_US] * machine[M.SM_CLOCK_MHZ]
+    terms[Term.LAUNCH] = machine[M.LAUNCH_KERNEL_US] * machine[M.SM_CLOCK_MHZ]
+    return terms
 
 
-def bounds(launch: Launch, machine: Machine, traffic: Traffic) -> Timing:
-    """Price one launch by its largest term; parameters as of ``pricing_of``."""
-    return roofline(pricing_of(launch, machine, traffic))
+@kernel
+def _chip_terms(terms: Any, totals: Any, machine: Any, facts: Any) -> None:
+    """What all units together ask of the chip."""
+    clock_hz = machine[M.SM_CLOCK_MHZ] * 1e6
+    dram_bytes_per_s = machine[M.MEMORY_DRAM_GB_PER_S] * 1e9 * machine[M.MEMORY_DRAM_EFFICIENCY]
+    terms[Term.DRAM] = facts[Fact.DRAM_BYTES] / (dram_bytes_per_s / clock_hz)
+    if machine[M.MEMORY_L2_BYTES]:
+        read, written = machine[M.MEMORY_L2_BYTES_PER_CLOCK], facts[Fact.WRITTEN_BYTES]
+        stores = written / (machine[M.MEMORY_L2_WRITE_BYTES_PER_CLOCK] or read)
+        terms[Term.L2] = (facts[Fact.L2_BYTES] - written) / read + stores
+    terms[Term.QUEUE] = facts[Fact.FULLEST_REQUESTS] * machine[M.ATOMICS_UNIT_NS_PER_REQUEST] * clock_hz * 1e-9
+    rate = atomic_rate(totals, machine[M.ATOMICS_REQUESTS_PER_CLOCK], machine[M.ATOMICS_UNAWAITED_PER_CLOCK])
+    conflicts = totals[E.ATOMIC_CONFLICTS] * machine[M.ATOMICS_CONFLICT_NS] * clock_hz * 1e-9
+    terms[Term.ATOMIC] = totals[E.ATOMIC_REQUESTS] / rate + conflicts
+    if machine[M.ATOMICS_LOCKS_DRAM]:
+        terms[Term.ATOMIC] += terms[Term.QUEUE]
 
 
-def roofline(pricing: Pricing) -> Timing:
-    """Take the largest term."""
-    terms = pricing.terms
-    bound = max(terms, key=lambda name: terms[name])
-    return timing(pricing, terms["launch"] + longest(terms, pricing.units), bound, "bounds")
+@kernel
+def longest(terms: Any, way: float) -> float:
+    """Cycles of the term that takes longest but for ``launch``; ``way`` is that to the chip's servers and back."""
+    roof = 0.0
+    for term in range(Term.LAUNCH):
+        trip = way if Term.DRAM <= term <= Term.QUEUE and terms[term] else 0.0
+        roof = max(roof, terms[term] + trip)
+    return roof
 
 
-def bound_terms(launch: Launch, machine: Machine, units: Demand, resident: Residency) -> dict[str, float]:
-    """Cycles of each term."""
-    sms = machine.sm.count
-    count = len(units.alone)
-    places = slots(launch, machine, resident)
-    together = max(1, min(count, int(places.sum())))
-    busy = max(1, min(count, int(np.count_nonzero(places))))
-    blocks = launch.grid if launch.dispatch == "blocks" else 0
-    local = {"issue": units.issue.sum(), "shared": units.shared.sum(), "l1": units.l1.sum()}
-    return {
-        **{name: float(cycles) / sms for name, cycles in local.items()},
-        "balance": float(max(local.values())) / busy if busy < sms else 0.0,
-        "latency": float(units.chain.sum()) / together,
-        "dram": float(units.dram.sum()),
-        "l2": float(units.l2.sum()),
-        "atomic": float(units.atomic.sum()),
-        "queue": float(units.queue.sum()),
-        "start": blocks / machine.launch.blocks_per_us * machine.sm.clock_mhz,
-        "launch": machine.launch.kernel_us * machine.sm.clock_mhz,
-    }
-
-
-def longest(terms: dict[str, float], units: Demand) -> float:
-    """Cycles of the term that takes longest, the way to the chip's servers and back included."""
-    way = float(units.chain.min()) if len(units.chain) else 0.0
-    return max(value + (way if name in SERVERS and value else 0.0) for name, value in terms.items() if name != "launch")
-
-
-def slots(launch: Launch, machine: Machine, resident: Residency) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Units that each SM can hold: blocks dealt to the SMs one after another, warps where each warp draws its own."""
-    sms = machine.sm.count
-    blocks = min(launch.grid, sms * resident.blocks)
-    dealt = np.full(sms, blocks // sms, np.int64)
-    dealt[: blocks % sms] += 1
-    return dealt * (-(-launch.block // machine.sm.warp_size) if launch.dispatch == "warp_queue" else 1)
-
-
-def timing(
-    pricing: Pricing,
-    cycles: float,
-    bound: str,
-    fidelity: str,
-    spread: tuple[float, float] | None = None,
-    **details: float,
-) -> Timing:
-    """Put a result together; ``spread`` is the lowest and the highest that ``cycles`` may be."""
-    low, high = (edge / pricing.machine.clock_hz * 1e3 for edge in spread or (cycles, cycles))
-    return Timing(
-        stage=pricing.launch.stage,
-        kernel=pricing.launch.kernel,
-        term_cycles=pricing.terms,
-        cycles=cycles,
-        milliseconds=cycles / pricing.machine.clock_hz * 1e3,
-        bound=bound,
-        occupancy=pricing.residency.occupancy,
-        dram_bytes=pricing.traffic.dram_bytes,
-        l2_bytes=pricing.traffic.l2_bytes,
-        details={"resident_blocks": float(pricing.residency.blocks)} | details,
-        fidelity=fidelity,
-        low=low,
-        high=high,
-        residency=_steps(pricing),
-    )
-
-
-def _steps(pricing: Pricing) -> str:
-    """Say where a time may step: blocks that an SM holds, and the rounds in which all SMs take the grid."""
-    held = f"{pricing.residency.blocks} an SM by {pricing.residency.limit}"
-    if pricing.launch.dispatch != "blocks":
-        return held
-    return f"{held}, {pricing.launch.grid / (pricing.residency.blocks * pricing.machine.sm.count):.2f} rounds"
+@kernel
+def bound_machine(terms: Any, way: float, row: Any) -> None:
+    """Fill in a row of ``Result`` by the roofline."""
+    cycles = terms[Term.LAUNCH] + longest(terms, way)
+    row[Result.CYCLES] = row[Result.LOW] = row[Result.HIGH] = cycles
+    row[Result.BOUND] = np.argmax(terms)

@@ -1,4 +1,4 @@
-"""Demands: what each unit of a launch asks of its SM and of the chip, in cycles.
+"""Demands: what each unit of a launch asks of its SM, in cycles.
 
 A unit of work (a block, or an item drawn by a persistent block or warp) holds
 
@@ -7,40 +7,66 @@ issue       the schedulers of its SM, by ``[issue]``: warp instructions x cycles
 shared      the shared memory of its SM: passes x cycles, replays included
 l1          the load/store path of its SM: bytes of its transactions, and the requests of atomics in L2 units, of which
             an SM sends its share of what all SMs together were measured to send
-dram, l2    the chip's bandwidths: its share of the launch's bytes
-atomic      the chip's atomic units together: requests, and lanes that conflict
-queue       the fullest atomic unit: every unit of work brings its share of the requests that wait there. Where atomics
-            lock DRAM, a request that waits for its lock holds up those behind it, so that the queue adds to
-            ``atomic``; L2 units wait side by side with the rest
 
 and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, or its own instructions when
-its warps are too few for all schedulers.
+its warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
+
+All but a few maxima are sums of machine events times cycles: ``rates`` makes the matrix, and ``demands`` sees of a
+machine nothing else, so that two machines with the same matrix have the same demands.
 """
 
-from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.events import INSTRUCTION_CLASSES
+from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES
 from tilestamp.models.events import MachineEvent as E
-from tilestamp.models.launch import Launch
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.machine import Machine
-from tilestamp.models.traffic import Traffic
+from tilestamp.models.numbers import Number as M
+from tilestamp.models.numbers import numbers_of
 
 Cycles = NDArray[np.float64]
+CLASSES = len(INSTRUCTION_CLASSES)
+SUMS = 11  # rows of the matrix of rates
+TOGETHER = 512  # units whose events stay in the cache of this computer while they are summed up
 
 
-@dataclass(frozen=True)
-class Demand:
+class Sum(IntEnum):
+    """Rows of the matrix of rates: sums of machine events."""
+
+    DISPATCH = 0  # cycles of the schedulers
+    PIPE_FP32 = 1  # cycles of an execution unit
+    PIPE_INT32 = 2
+    PIPE_MUL32 = 3
+    PIPE_SFU = 4
+    SHARED = 5  # cycles of shared memory
+    L1 = 6  # cycles of the load and store path, without stores
+    CHAIN = 7  # cycles of round trips, one after another
+    STORED = 8  # bytes
+    SCATTERED = 9  # bytes of the transactions stored: those beyond went to local memory
+    OTHERS = 10  # no sum: ``Other``
+
+
+class Other(IntEnum):
+    """What else demands depend on, in the last row of the matrix."""
+
+    START = 0  # cycles that a block waits for its own start
+    SPREAD = 1  # schedulers / those that a unit's warps can use
+    SCATTERED = 2  # cycles of the load and store path for a byte stored
+    LOCAL = 3  # the same, in local memory
+
+
+class Demand(NamedTuple):
     """Cycles by unit of work, each array (units,), float64.
 
     Parameters
     ----------
     issue, shared, l1 : ndarray
         On the unit's own SM.
-    dram, l2, atomic, queue : ndarray
-        Of the whole chip.
     chain : ndarray
         Round trips that the unit waits for, one after another.
     alone : ndarray
@@ -50,139 +76,142 @@ class Demand:
     issue: Cycles
     shared: Cycles
     l1: Cycles
-    dram: Cycles
-    l2: Cycles
-    atomic: Cycles
-    queue: Cycles
     chain: Cycles
     alone: Cycles
 
 
-def demand(launch: Launch, machine: Machine, traffic: Traffic) -> Demand:
+def demand(launch: Launch, machine: Machine, load_miss: float) -> Demand:
     """Cycles that each unit of a launch asks for.
 
     Parameters
     ----------
     launch : Launch
     machine : Machine
-    traffic : Traffic
-        Bytes of the launch.
+    load_miss : float
+        Share of the bytes loaded that come from DRAM.
     """
-    events = launch.events
-    memory = machine.memory
-    groups = machine.sm.warp_size / memory.bank_lanes
-    dispatch = _dispatch(events, machine)
-    issue = np.maximum(dispatch, _fullest_pipe(events, machine))
-    passes = (events[:, E.SHARED] + events[:, E.SHARED_ATOMIC]) * groups + events[:, E.BANK_REPLAYS]
-    bytes_moved = events[:, E.LOAD_BYTES] + events[:, E.STORE_BYTES]
-    share = _shares(bytes_moved)
-    chain = _chain(launch, machine, traffic)
-    queue = _shares(events[:, E.ATOMIC_REQUESTS]) * _fullest_queue(launch, machine)
-    l2_cycles = _l2_cycles(traffic, machine)
-    warps = 1 if launch.dispatch == "warp_queue" else -(-launch.block // machine.sm.warp_size)
-    spread = machine.sm.schedulers / min(machine.sm.schedulers, warps)
-    return Demand(
-        issue=issue,
-        shared=passes * memory.bank_pass_cycles,
-        l1=_l1_cycles(events, machine) + _sent(events, machine),
-        dram=share * (traffic.dram_bytes / machine.dram_bytes_per_cycle),
-        l2=share * l2_cycles,
-        atomic=_atomic(events, machine) + (queue if machine.atomics.place == "dram_lock" else 0.0),
-        queue=queue,
-        chain=chain,
-        alone=np.maximum(chain, issue * spread),
-    )
+    matrix = rates(launch.shape, numbers_of([machine])[0], float(load_miss), launch.totals)
+    found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
+    demands(launch.columns, matrix, found)
+    return found
 
 
-def _l1_cycles(events: Cycles, machine: Machine) -> Cycles:
-    """Cycles of the SM's load and store path: stores may be slower than loads, those to local memory less so.
+@kernel
+def rates(launch: Shape, machine: Any, load_miss: float, totals: Any) -> Any:
+    """Cycles of each machine event, (SUMS, EVENTS): 0 where the launch has none of it.
 
-    Bytes stored beyond those of the transactions went to local memory.
+    Parameters
+    ----------
+    launch : Shape
+    machine : ndarray, (len(Number),)
+    load_miss : float
+    totals : ndarray, (EVENTS,)
+        Events of all units.
     """
-    memory = machine.memory
-    write = memory.l1_write_bytes_per_clock or memory.l1_bytes_per_clock
-    stored = events[:, E.STORE_BYTES]
-    scattered = np.minimum(stored, events[:, E.STORE_TRANSACTIONS] * memory.l2_line_bytes)
-    local = (stored - scattered) / (memory.l1_local_bytes_per_clock or write)
-    cycles: Cycles = events[:, E.LOAD_BYTES] / memory.l1_bytes_per_clock + scattered / write + local
-    return cycles
+    matrix = np.zeros((SUMS, EVENTS))
+    _issue_rates(matrix, machine)
+    passes = machine[M.MEMORY_BANK_PASS_CYCLES]
+    groups = machine[M.SM_WARP_SIZE] / machine[M.MEMORY_BANK_LANES]
+    matrix[Sum.SHARED, E.SHARED] = matrix[Sum.SHARED, E.SHARED_ATOMIC] = groups * passes
+    matrix[Sum.SHARED, E.BANK_REPLAYS] = passes
+    matrix[Sum.L1, E.LOAD_BYTES] = 1.0 / machine[M.MEMORY_L1_BYTES_PER_CLOCK]
+    awaited = machine[M.ATOMICS_SM_REQUESTS_PER_CLOCK] or machine[M.ATOMICS_REQUESTS_PER_CLOCK]
+    matrix[Sum.L1, E.ATOMIC_REQUESTS] = 1.0 / atomic_rate(totals, awaited, machine[M.ATOMICS_SM_UNAWAITED_PER_CLOCK])
+    _chain_rates(matrix, machine, load_miss)
+    matrix[Sum.STORED, E.STORE_BYTES] = 1.0
+    matrix[Sum.SCATTERED, E.STORE_TRANSACTIONS] = machine[M.MEMORY_L2_LINE_BYTES]
+    for column in range(EVENTS):
+        if totals[column] == 0:
+            matrix[:, column] = 0.0
+    _other_rates(matrix[Sum.OTHERS], launch, machine, totals[E.STORE_BYTES] > 0)
+    return matrix
 
 
-def _l2_cycles(traffic: Traffic, machine: Machine) -> float:
-    """L2 cycles of all bytes: stores may be slower than loads."""
-    memory = machine.memory
-    if not memory.l2_bytes:
-        return 0.0
-    stores = traffic.written_bytes / (memory.l2_write_bytes_per_clock or memory.l2_bytes_per_clock)
-    return (traffic.l2_bytes - traffic.written_bytes) / memory.l2_bytes_per_clock + stores
+@kernel
+def _issue_rates(matrix: Any, machine: Any) -> None:
+    """SM cycles of the schedulers, and of the execution units behind them, which work side by side."""
+    schedulers = machine[M.SM_SCHEDULERS]
+    for column in range(CLASSES):
+        matrix[Sum.DISPATCH, column] = machine[M.ISSUE_FP32 + column] / schedulers
+    matrix[Sum.PIPE_FP32, E.FP32] = machine[M.PIPE_FP32] / schedulers
+    matrix[Sum.PIPE_INT32, E.INT32] = machine[M.PIPE_INT32] / schedulers
+    matrix[Sum.PIPE_INT32, E.CONTROL] = machine[M.PIPE_CONTROL] / schedulers
+    matrix[Sum.PIPE_MUL32, E.MUL32] = machine[M.PIPE_MUL32] / schedulers
+    matrix[Sum.PIPE_SFU, E.SFU] = machine[M.PIPE_SFU] / schedulers
 
 
-def _dispatch(events: Cycles, machine: Machine) -> Cycles:
-    """SM cycles in which the schedulers are busy."""
-    costs = np.array([getattr(machine.issue, event.name.lower()) for event in INSTRUCTION_CLASSES])
-    cycles: Cycles = events[:, : len(INSTRUCTION_CLASSES)] @ costs
-    return cycles / machine.sm.schedulers
+@kernel
+def _chain_rates(matrix: Any, machine: Any, load_miss: float) -> None:
+    """Cycles of the dependent round trips; a load that misses waits for DRAM."""
+    far = machine[M.LATENCY_DRAM_CYCLES]
+    near = machine[M.LATENCY_L2_CYCLES] if machine[M.MEMORY_L2_BYTES] else far
+    matrix[Sum.CHAIN, E.CHAIN_ALU] = machine[M.LATENCY_ALU_CYCLES]
+    matrix[Sum.CHAIN, E.CHAIN_SHARED] = machine[M.LATENCY_SHARED_CYCLES]
+    matrix[Sum.CHAIN, E.CHAIN_LOAD] = near + (far - near) * min(1.0, load_miss)
+    matrix[Sum.CHAIN, E.CHAIN_ATOMIC] = machine[M.LATENCY_ATOMIC_CYCLES]
+    matrix[Sum.CHAIN, E.CHAIN_BARRIER] = machine[M.LATENCY_BARRIER_CYCLES]
 
 
-def _fullest_pipe(events: Cycles, machine: Machine) -> Cycles:
-    """SM cycles of the execution unit that is busy longest."""
-    pipe = machine.pipe
-    pipes = (
-        events[:, E.FP32] * pipe.fp32,
-        events[:, E.INT32] * pipe.int32 + events[:, E.CONTROL] * pipe.control,
-        events[:, E.MUL32] * pipe.mul32,
-        events[:, E.SFU] * pipe.sfu,
-    )
-    longest: Cycles = np.max(np.stack(pipes), axis=0)
-    return longest / machine.sm.schedulers
+@kernel
+def _other_rates(others: Any, launch: Shape, machine: Any, stores: bool) -> None:
+    """Rates that are of no event; stores may be slower than loads, those to local memory less so."""
+    schedulers = machine[M.SM_SCHEDULERS]
+    warps = -(-launch.block // machine[M.SM_WARP_SIZE]) if launch.block_is_unit else 1.0
+    others[Other.START] = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
+    others[Other.SPREAD] = schedulers / min(schedulers, warps)
+    if stores:
+        write = machine[M.MEMORY_L1_WRITE_BYTES_PER_CLOCK] or machine[M.MEMORY_L1_BYTES_PER_CLOCK]
+        others[Other.SCATTERED] = 1.0 / write
+        others[Other.LOCAL] = 1.0 / (machine[M.MEMORY_L1_LOCAL_BYTES_PER_CLOCK] or write)
 
 
-def _chain(launch: Launch, machine: Machine, traffic: Traffic) -> Cycles:
-    """Cycles of the dependent round trips of each unit; a block also waits for its own start."""
-    latency = machine.latency
-    near = latency.l2_cycles if machine.memory.l2_bytes else latency.dram_cycles
-    load = near + (latency.dram_cycles - near) * min(1.0, traffic.load_miss)
-    columns = [E.CHAIN_ALU, E.CHAIN_SHARED, E.CHAIN_LOAD, E.CHAIN_ATOMIC, E.CHAIN_BARRIER]
-    cycles = [latency.alu_cycles, latency.shared_cycles, load, latency.atomic_cycles, latency.barrier_cycles]
-    waited: Cycles = launch.events[:, columns] @ np.array(cycles)
-    return waited + (latency.block_launch_cycles if launch.dispatch == "blocks" else 0.0)
-
-
-def _atomic(events: Cycles, machine: Machine) -> Cycles:
-    """Cycles of all atomic units together."""
-    atomics = machine.atomics
-    conflict_cycles = atomics.conflict_ns * machine.clock_hz * 1e-9
-    rate = _rate(events, atomics.requests_per_clock, atomics.unawaited_per_clock)
-    return events[:, E.ATOMIC_REQUESTS] / rate + events[:, E.ATOMIC_CONFLICTS] * conflict_cycles
-
-
-def _sent(events: Cycles, machine: Machine) -> Cycles:
-    """Cycles in which the SM of a unit sends its atomic requests."""
-    atomics = machine.atomics
-    awaited = atomics.sm_requests_per_clock or atomics.requests_per_clock
-    sent: Cycles = events[:, E.ATOMIC_REQUESTS] / _rate(events, awaited, atomics.sm_unawaited_per_clock)
-    return sent
-
-
-def _rate(events: Cycles, awaited: float, unawaited: float) -> float:
+@kernel
+def atomic_rate(totals: Any, awaited: float, unawaited: float) -> float:
     """Requests in a clock; there may be more where nobody waits for the value returned (0: there are not)."""
-    return unawaited if unawaited and not events[:, E.CHAIN_ATOMIC].any() else awaited
+    return unawaited if unawaited and not totals[E.CHAIN_ATOMIC] else awaited
 
 
-def _fullest_queue(launch: Launch, machine: Machine) -> float:
-    """Cycles for which the atomic unit with the most requests is busy."""
-    if launch.atomic_requests is None or not launch.atomic_requests.any():
-        return 0.0
-    atomics = machine.atomics
-    chunk = np.arange(len(launch.atomic_requests)) * 32
-    unit = chunk // atomics.unit_bytes
-    if atomics.units:
-        unit %= atomics.units
-    fullest = float(np.bincount(unit, weights=launch.atomic_requests).max())
-    return fullest * atomics.unit_ns_per_request * machine.clock_hz * 1e-9
+@kernel
+def demands(events: Any, matrix: Any, found: Demand) -> None:
+    """Fill in what each unit asks for.
+
+    Parameters
+    ----------
+    events : ndarray, (EVENTS, units)
+    matrix : ndarray, (SUMS, EVENTS)
+        From ``rates``.
+    found : Demand
+        Filled in.
+    """
+    units, others = events.shape[1], matrix[Sum.OTHERS]
+    sums = np.empty((SUMS, TOGETHER))
+    for first in range(0, units, TOGETHER):
+        last = min(units, first + TOGETHER)
+        _sum_up(events[:, first:last], matrix, sums)
+        for i in range(last - first):
+            row, unit = sums[:, i], first + i
+            pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
+            issue = max(row[Sum.DISPATCH], pipe)
+            chain = row[Sum.CHAIN] + others[Other.START]
+            scattered = min(row[Sum.STORED], row[Sum.SCATTERED])
+            local = (row[Sum.STORED] - scattered) * others[Other.LOCAL]
+            found.issue[unit] = issue
+            found.shared[unit] = row[Sum.SHARED]
+            found.l1[unit] = row[Sum.L1] + scattered * others[Other.SCATTERED] + local
+            found.chain[unit] = chain
+            found.alone[unit] = max(chain, issue * others[Other.SPREAD])
 
 
-def _shares(amounts: Cycles) -> Cycles:
-    """Each unit's share of a total; equal shares of nothing."""
-    total = amounts.sum()
-    return amounts / total if total > 0 else np.full(len(amounts), 1.0 / max(1, len(amounts)))
+@kernel
+def _sum_up(events: Any, matrix: Any, sums: Any) -> None:
+    """Product of a matrix that is mostly empty and of events that are a column each."""
+    units = events.shape[1]
+    for row in range(Sum.OTHERS):
+        into = sums[row]
+        into[:units] = 0.0
+        for column in range(EVENTS):
+            rate = matrix[row, column]
+            if rate:
+                counts = events[column]
+                for i in range(units):
+                    into[i] += rate * counts[i]

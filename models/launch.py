@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,25 @@ class Stream:
     footprint_bytes: int
     span_bytes: int = 0
     requested_bytes: int = 0
+
+
+class Shape(NamedTuple):
+    """What a kernel sees of a launch besides its events.
+
+    Parameters
+    ----------
+    units, grid, block : int
+    drawn : bool
+        Whether units are drawn from a queue by persistent blocks or warps.
+    block_is_unit : bool
+        Whether all warps of a block work on a unit together; else each warp draws its own.
+    """
+
+    units: int
+    grid: int
+    block: int
+    drawn: bool
+    block_is_unit: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +91,23 @@ class Launch:
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
+
+    @property
+    def shape(self) -> Shape:
+        """What a kernel sees of it."""
+        drawn, alone = self.dispatch != "blocks", self.dispatch != "warp_queue"
+        return Shape(len(self.events), self.grid, self.block, drawn, alone)
+
+    @cached_property
+    def columns(self) -> NDArray[np.float64]:
+        """Events by column, as kernels read them, (len(MachineEvent), units)."""
+        return np.ascontiguousarray(self.events.T)
+
+    @cached_property
+    def totals(self) -> NDArray[np.float64]:
+        """Events of all units, (len(MachineEvent),)."""
+        totals: NDArray[np.float64] = self.events.sum(axis=0)
+        return totals
 
 
 @dataclass(frozen=True, kw_only=True)

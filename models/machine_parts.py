@@ -130,6 +130,11 @@ class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sm_requests_per_clock: Amount = 0.0  # what one SM sends; 0: not known, as much as all units together take
     sm_unawaited_per_clock: Amount = 0.0  # as sm_requests_per_clock, where no value is returned; 0: the same
 
+    @property
+    def locks_dram(self) -> bool:
+        """Whether an atomic locks DRAM."""
+        return self.place == "dram_lock"
+
 
 class Launching(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a launch costs besides its work."""

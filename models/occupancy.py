@@ -11,6 +11,9 @@ of a block's size and allows fewer blocks; this follows the header, which is wha
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+
+from msgspec.structs import replace
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine
@@ -57,54 +60,62 @@ def residency(machine: Machine, block: int, registers: int, shared_bytes: int) -
     TilestampError
         A block that the machine cannot launch, naming what exceeds.
     """
-    sm = machine.sm
+    held = _residency(holding_of(machine), block, registers, shared_bytes)
+    if isinstance(held, str):
+        raise TilestampError(held.format(machine=machine.name))
+    return held
+
+
+def holding_of(machine: Machine) -> Sm:
+    """All of a machine that residency depends on: its SM, but for how many there are and how fast they are."""
+    return replace(machine.sm, count=1, schedulers=1, clock_mhz=1.0)
+
+
+@lru_cache(1 << 14)
+def _residency(sm: Sm, block: int, registers: int, shared_bytes: int) -> Residency | str:
+    """Blocks of one kind that an SM holds, or why no machine that has it can launch them."""
+    if refusal := _refusal(sm, block, registers, shared_bytes):
+        return refusal
     warps = _warps(sm, block)
-    _check_launch(machine, block, registers, shared_bytes)
-    register_blocks = _blocks_by_registers(machine, warps, registers)
     shared = _round_up(shared_bytes + sm.reserved_shared_bytes, sm.shared_unit_bytes)
     limits = {
         "blocks": sm.max_blocks,
         "warps": sm.max_warps // warps,
         "threads": sm.max_threads // (warps * sm.warp_size),
-        "registers": register_blocks,
+        "registers": _blocks_by_registers(sm, warps, registers),
         "shared memory": sm.shared_bytes // shared if shared else sm.max_blocks,
     }
     limit = min(limits, key=lambda name: limits[name])
     blocks = limits[limit]
     if blocks == 0:
-        raise TilestampError(
+        return (
             f"a block of {block} threads with {registers} registers each and {shared_bytes} bytes of shared memory "
-            f"does not fit an SM of {machine.name}: not enough {limit}"
+            f"does not fit an SM of {{machine}}: not enough {limit}"
         )
     return Residency(blocks, blocks * warps, blocks * warps / sm.max_warps, limit)
 
 
-def _check_launch(machine: Machine, block: int, registers: int, shared_bytes: int) -> None:
-    """Refuse what no launch may ask for."""
-    sm = machine.sm
+def _refusal(sm: Sm, block: int, registers: int, shared_bytes: int) -> str:
+    """Say what no launch may ask for; nothing where it may."""
     if block < 1:
-        raise TilestampError(f"a block needs at least one thread, not {block}")
+        return f"a block needs at least one thread, not {block}"
     if block > sm.max_threads_per_block:
-        raise TilestampError(f"{machine.name} launches at most {sm.max_threads_per_block} threads a block, not {block}")
+        return f"{{machine}} launches at most {sm.max_threads_per_block} threads a block, not {block}"
     if registers > sm.max_registers_per_thread:
-        raise TilestampError(
-            f"{machine.name} has at most {sm.max_registers_per_thread} registers a thread, not {registers}"
-        )
+        return f"{{machine}} has at most {sm.max_registers_per_thread} registers a thread, not {registers}"
     warps = _round_up(_warps(sm, block), sm.block_warp_granularity or sm.warp_granularity)
     most = sm.registers_per_block or sm.registers
     if sm.register_allocation == "warp" and warps * _of_a_warp(sm, registers) > most:
-        raise TilestampError(
-            f"{machine.name} gives a block at most {most} registers, too few for {block} threads with {registers} each"
-        )
+        return f"{{machine}} gives a block at most {most} registers, too few for {block} threads with {registers} each"
     most = sm.shared_bytes - sm.reserved_shared_bytes
     most = min(most, sm.shared_bytes_per_block or most)
     if shared_bytes > most:
-        raise TilestampError(f"{machine.name} gives a block at most {most} bytes of shared memory, not {shared_bytes}")
+        return f"{{machine}} gives a block at most {most} bytes of shared memory, not {shared_bytes}"
+    return ""
 
 
-def _blocks_by_registers(machine: Machine, warps: int, registers: int) -> int:
+def _blocks_by_registers(sm: Sm, warps: int, registers: int) -> int:
     """Blocks that the register file holds."""
-    sm = machine.sm
     if registers == 0:
         return sm.max_blocks
     if sm.register_allocation == "block":

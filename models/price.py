@@ -1,26 +1,52 @@
-"""Price: the launches of a frame, in order, on a machine, at the fidelity requested."""
+"""Price: the launches of a frame, in order, on one machine or on many, at the fidelity requested.
+
+One machine is a batch of one: ``models.launch_prices`` has the only formula.
+"""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from tilestamp.models.auto import auto
-from tilestamp.models.bounds import bounds
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.batch import Batch
+from tilestamp.models.bounds import HOLDS, Result, Term
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.fixed_function import pipe_time
+from tilestamp.models.fixed_function import check_pipe, pipe_time
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine
-from tilestamp.models.occupancy import residency
-from tilestamp.models.schedule import schedule
+from tilestamp.models.occupancy import Residency, residency
 from tilestamp.models.timing import Timing
-from tilestamp.models.traffic import Traffic, traffic
+from tilestamp.models.traffic import Traffic
 from tilestamp.models.used import note
 
-Fidelity = Literal["counts", "bounds", "auto", "schedule"]
-FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "auto", "schedule")
+Fidelity = Literal["counts", "bounds", "schedule"]
+FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "schedule")
+ENDS = [Result.CYCLES, Result.LOW, Result.HIGH]
+NAN = float("nan")
+
+
+class Times(NamedTuple):
+    """Times of launches on machines.
+
+    Parameters
+    ----------
+    milliseconds, low, high : ndarray, (machines, launches), float64
+        As of ``Timing``.
+    bounds : ndarray, (machines, launches), str
+    """
+
+    milliseconds: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    bounds: NDArray[np.str_]
 
 
 def price(
-    launches: Sequence[Launch | PipeLaunch], machine: Machine, fidelity: Fidelity = "schedule", error: float = 0.0
+    launches: Sequence[Launch | PipeLaunch],
+    machine: Machine,
+    fidelity: Fidelity = "schedule",
+    moved: Sequence[Traffic] | None = None,
 ) -> list[Timing]:
     """Price the launches of one frame.
 
@@ -29,11 +55,10 @@ def price(
     launches : sequence of Launch or PipeLaunch
         In launch order: what a launch leaves in the cache, a later one finds there.
     machine : Machine
-    fidelity : {"counts", "bounds", "auto", "schedule"}
-        No time at all; a roofline for each launch; the cheaper of its neighbours, launch by launch
-        (``tilestamp.models.auto``); units of work played on the SMs.
-    error : float
-        Relative error of time that ``auto`` may make against ``schedule``; 0 for ``tilestamp.models.auto.ERROR``.
+    fidelity : {"counts", "bounds", "schedule"}
+        No time at all; a roofline for each launch; units of work scheduled on the SMs.
+    moved : sequence of Traffic, optional
+        Bytes of each launch, if they are not to be those of ``tilestamp.models.traffic``.
 
     Returns
     -------
@@ -45,29 +70,107 @@ def price(
     TilestampError
         An unknown fidelity, or a block that the machine cannot launch.
     """
+    _check(fidelity)
+    batch = Batch(taken([machine]))
+    each = batch.traffic(launches) if moved is None else [[bytes_] for bytes_ in moved]
+    return [_timing(launch, batch, bytes_, fidelity) for launch, bytes_ in zip(launches, each, strict=True)]
+
+
+def prices(
+    launches: Sequence[Launch | PipeLaunch], machines: Sequence[Machine], fidelity: Fidelity = "schedule"
+) -> Times:
+    """Price the launches of one frame on many machines (from ``taken``), as arrays; errors as of ``price``."""
+    _check(fidelity)
+    batch, shape = Batch(machines), (len(machines), len(launches))
+    times = no_times(shape, "none")
+    if fidelity == "counts":
+        return times
+    for place, (launch, moved) in enumerate(zip(launches, batch.traffic(launches), strict=True)):
+        if isinstance(launch, Launch):
+            rows = batch.prices(launch, moved, scheduled=fidelity == "schedule")
+            found = rows[:, ENDS].T / batch.clock_hz * 1e3
+            times.bounds[:, place] = np.array(HOLDS)[rows[:, Result.BOUND].astype(np.intp)]
+        else:
+            passes = [pipe_time(launch, machine, bytes_) for machine, bytes_ in zip(batch.machines, moved, strict=True)]
+            found = np.array([(each.milliseconds, each.low, each.high) for each in passes]).reshape(-1, 3).T
+            times.bounds[:, place] = [each.bound for each in passes]
+        times.milliseconds[:, place], times.low[:, place], times.high[:, place] = found
+    return times
+
+
+def no_times(shape: tuple[int, int], bound: str) -> Times:
+    """Times that are not known yet, (machines, launches)."""
+    milliseconds, low, high = np.full((3, *shape), np.nan)
+    return Times(milliseconds, low, high, np.full(shape, bound, "U32"))
+
+
+def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> None:
+    """Refuse what ``price`` refuses, without a price.
+
+    Raises
+    ------
+    TilestampError
+        A block that the machine cannot launch, or a pipe that it has not.
+    """
+    for launch in launches:
+        if isinstance(launch, Launch):
+            residency(machine, launch.block, launch.registers, launch.shared_bytes)
+        else:
+            check_pipe(launch, machine)
+
+
+def taken(machines: Sequence[Machine]) -> list[Machine]:
+    """Note that prices are made on machines, and take their fitted numbers as they are moved now."""
+    for machine in machines:
+        note("machines", machine.name, machine.digest)
+    return [machine.as_moved for machine in machines]
+
+
+def _check(fidelity: str) -> None:
     if fidelity not in FIDELITIES:
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
-    note("machines", machine.name, machine.digest)
-    machine = machine.as_moved
-    traffics = traffic(launches, machine)
-    if fidelity == "auto":
-        return auto(launches, machine, traffics, error)
-    return [_one(launch, machine, bytes_, fidelity) for launch, bytes_ in zip(launches, traffics, strict=True)]
 
 
-def _one(launch: Launch | PipeLaunch, machine: Machine, bytes_: Traffic, fidelity: Fidelity) -> Timing:
-    if fidelity == "counts":
-        return _counts(launch, machine, bytes_)
+def _timing(launch: Launch | PipeLaunch, batch: Batch, moved: Sequence[Traffic], fidelity: Fidelity) -> Timing:
+    """Price one launch on the only machine of a batch."""
+    (machine,), (bytes_,) = batch.machines, moved
     if isinstance(launch, PipeLaunch):
-        return pipe_time(launch, machine, bytes_)
-    return schedule(launch, machine, bytes_) if fidelity == "schedule" else bounds(launch, machine, bytes_)
+        return pipe_time(launch, machine, bytes_) if fidelity != "counts" else _untimed(launch, bytes_, 0.0)
+    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
+    if fidelity == "counts":
+        return _untimed(launch, bytes_, held.occupancy)
+    row = batch.prices(launch, moved, scheduled=fidelity == "schedule")[0].tolist()
+    cycles, low, high = (row[place] for place in ENDS)
+    details = {"resident_blocks": float(held.blocks)}
+    if fidelity == "schedule":
+        details |= {"busy_sms": row[Result.BUSY_SMS], "tail_cycles": row[Result.TAIL_CYCLES]}
+    return Timing(
+        stage=launch.stage,
+        kernel=launch.kernel,
+        term_cycles={HOLDS[term]: row[term] for term in Term},
+        cycles=cycles,
+        milliseconds=cycles / machine.clock_hz * 1e3,
+        bound=HOLDS[int(row[Result.BOUND])],
+        occupancy=held.occupancy,
+        dram_bytes=bytes_.dram_bytes,
+        l2_bytes=bytes_.l2_bytes,
+        details=details,
+        fidelity=fidelity,
+        low=low / machine.clock_hz * 1e3,
+        high=high / machine.clock_hz * 1e3,
+        residency=_steps(launch, machine, held),
+    )
 
 
-def _counts(launch: Launch | PipeLaunch, machine: Machine, bytes_: Traffic) -> Timing:
+def _untimed(launch: Launch | PipeLaunch, moved: Traffic, occupancy: float) -> Timing:
     """Everything but time."""
-    nan = float("nan")
-    occupancy = 0.0
-    if isinstance(launch, Launch):
-        occupancy = residency(machine, launch.block, launch.registers, launch.shared_bytes).occupancy
-    totals = bytes_.dram_bytes, bytes_.l2_bytes
-    return Timing(launch.stage, launch.kernel, {}, nan, nan, "none", occupancy, *totals, fidelity="counts")
+    totals = moved.dram_bytes, moved.l2_bytes
+    return Timing(launch.stage, launch.kernel, {}, NAN, NAN, "none", occupancy, *totals, fidelity="counts")
+
+
+def _steps(launch: Launch, machine: Machine, held: Residency) -> str:
+    """Say where a time may step: blocks that an SM holds, and the rounds in which all SMs take the grid."""
+    told = f"{held.blocks} an SM by {held.limit}"
+    if launch.dispatch != "blocks":
+        return told
+    return f"{told}, {launch.grid / (held.blocks * machine.sm.count):.2f} rounds"

@@ -28,37 +28,24 @@ The halves are expectations. ``low`` and ``high`` are the times at which nobody 
 unit waits for the mean share of its time: which one ends last may change, and they stay continuous.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import Pricing, longest, pricing_of, slots, timing
-from tilestamp.models.launch import Launch
+from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
+from tilestamp.models.demand import Demand
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Shape
 from tilestamp.models.list_schedule import list_schedule
-from tilestamp.models.machine import Machine
-from tilestamp.models.timing import Timing
-from tilestamp.models.traffic import Traffic
+from tilestamp.models.numbers import Number as M
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
 IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often as the other
 
 
-def schedule(launch: Launch, machine: Machine, traffic: Traffic) -> Timing:
-    """Price one launch by its units' starts and ends; parameters and errors as of ``pricing_of``.
-
-    Returns
-    -------
-    Timing
-        Never below ``bounds``. ``details`` has ``busy_sms`` (SMs that got a unit) and ``tail_cycles`` (from the start
-        of the last unit to the end).
-    """
-    pricing = pricing_of(launch, machine, traffic)
-    return played(pricing, loads(pricing))
-
-
 class Loads(NamedTuple):
-    """What the units of a launch load the machine with; arrays have a row a unit, in cycles.
+    """What the units of a launch load the SMs with; arrays have a row a unit, in cycles.
 
     Parameters
     ----------
@@ -76,12 +63,6 @@ class Loads(NamedTuple):
         Cycles from one start to the next; 0 where units are drawn from a queue.
     start : float
         Cycles from a free place to the first instruction of the block put there; 0 where units are drawn.
-    begun : float
-        Cycles before persistent blocks draw their first units.
-    memory, atomic : float
-        Cycles of the fuller of DRAM and L2, and of the atomic units; draws are not among them.
-    way : float
-        Cycles before their first request and after their last.
     """
 
     sm: NDArray[np.float64]
@@ -91,106 +72,138 @@ class Loads(NamedTuple):
     sms: int
     interval: float
     start: float
-    begun: float
-    memory: float
-    atomic: float
-    way: float
 
 
-def loads(pricing: Pricing) -> Loads:
-    """What the units of a launch load the machine with."""
-    launch, machine, units = pricing.launch, pricing.machine, pricing.units
-    blocks = launch.dispatch == "blocks"
-    places = slots(launch, machine, pricing.residency)
-    sm = np.maximum(np.maximum(units.issue, units.shared), units.l1)
-    start = machine.latency.block_launch_cycles if len(sm) else 0.0
-    return Loads(
-        sm=sm,
-        alone=np.maximum(np.maximum(units.alone, sm), 1.0),
-        draws=np.empty(0) if blocks else units.queue,
-        places=int(places.sum()),
-        sms=max(1, int(np.count_nonzero(places))),
-        interval=pricing.terms["start"] / max(1, len(sm)),
-        start=start if blocks else 0.0,
-        begun=0.0 if blocks else start,
-        memory=max(pricing.terms["dram"], pricing.terms["l2"]),
-        atomic=max(pricing.terms["atomic"], pricing.terms["queue"] if blocks else 0.0),
-        way=float(units.chain.min()) if len(sm) else 0.0,
-    )
+class Played(NamedTuple):
+    """How the SMs work the units off, in cycles.
+
+    Parameters
+    ----------
+    low, end, high : float
+        End of the last unit: at least, expected, at most.
+    started : float
+        When the unit that ends last got its place.
+    own : float
+        What a unit takes by itself, in the mean.
+    served : float
+        What an SM serves in all, in the mean.
+    """
+
+    low: float
+    end: float
+    high: float
+    started: float
+    own: float
+    served: float
 
 
-def played(pricing: Pricing, units: Loads) -> Timing:
-    """Price it."""
-    terms = pricing.terms
-    least = longest(terms, pricing.units)
-    low, end, high, started = ends(units)
-    sooner, expected, later = (
-        together(units, units.begun + e, s) for e, s in ((low, 0.0), (end, IN_THE_WAY), (high, 1.0))
-    )
-    cycles = max(expected, least)
-    tail = max(0.0, cycles - units.begun - started)
-    return timing(
-        pricing,
-        terms["launch"] + cycles,
-        _holds(terms, cycles, tail, units.sms < pricing.machine.sm.count),
-        "schedule",
-        (terms["launch"] + max(least, sooner), terms["launch"] + max(least, later)),
-        busy_sms=float(min(len(units.alone), units.sms)),
-        tail_cycles=tail,
-    )
+@kernel
+def load_units(units: Demand, sm: Any, alone: Any) -> None:
+    """Fill in ``Loads.sm`` and ``Loads.alone``."""
+    for i in range(len(sm)):
+        busy = max(max(units.issue[i], units.shared[i]), units.l1[i])
+        sm[i] = busy
+        alone[i] = max(max(units.alone[i], busy), 1.0)
 
 
-def together(units: Loads, end: float, share: float) -> float:
-    """Cycles of the SMs, memory and atomic units side by side, for a share of the smaller in each other's way."""
-    if not end:
-        return 0.0
-    own, served = float(units.alone.mean()), float(units.sm.sum()) / units.sms
-    sides = (
-        (end, 0.0, units.memory + units.atomic),
-        (units.memory, units.way, units.atomic + served),
-        (units.atomic, units.way, units.memory + served),
-    )
-    return max(time + trip + share * min(time, others, own) for time, trip, others in sides)
+@kernel
+def loads(launch: Shape, sm: Any, alone: Any, requests: Any, terms: Any, machine: Any, facts: Any) -> Loads:
+    """What the units of a launch load the SMs with.
+
+    Parameters
+    ----------
+    launch : Shape
+    sm, alone : ndarray, (units,)
+        From ``load_units``.
+    requests : ndarray, (units,)
+        Atomic requests.
+    terms : ndarray, (len(Term),)
+    machine : ndarray, (len(Number),)
+    facts : ndarray, (len(Fact),)
+    """
+    places, sms = places_of(launch, machine, facts)
+    draws = np.empty(launch.units if launch.drawn else 0)
+    if len(draws):
+        total = requests.sum()
+        for i in range(launch.units):
+            draws[i] = terms[Term.QUEUE] * (requests[i] / total if total > 0 else 1.0 / launch.units)
+    start = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
+    return Loads(sm, alone, draws, places, sms, terms[Term.START] / max(1, launch.units), start)
 
 
-def ends(units: Loads) -> tuple[float, float, float, float]:
-    """Cycles to the end of the last unit: at least, expected, at most; and to its start."""
+@kernel
+def play(units: Loads) -> Played:
+    """Work the units off."""
     extra = crowd(units)
-    own, more = float(units.alone.sum()), float(extra.sum())
+    own, more = units.alone.sum(), extra.sum()
+    mean, served = own / max(1, len(extra)), units.sm.sum() / units.sms
     end, started = _ends(units, units.alone + extra, units.places)
     waited = end * more / (own + more) if more else 0.0
     if more and own / units.sms < end + waited:
         lonely, lonely_started = _ends(units, units.alone, units.sms)
         started = lonely_started if lonely < end else started
-        return min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started
-    return end - waited, end, end + waited, started
+        return Played(min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served)
+    return Played(end - waited, end, end + waited, started, mean, served)
 
 
-def _ends(units: Loads, alone: NDArray[np.float64], places: int) -> tuple[float, float]:
-    result: tuple[float, float] = list_schedule(
-        units.sm, alone, units.draws, places, units.sms, units.interval, units.start
-    )
-    return result
+@kernel
+def _ends(units: Loads, alone: Any, places: int) -> tuple[float, float]:
+    return list_schedule(units.sm, alone, units.draws, places, units.sms, units.interval, units.start)  # type: ignore[no-any-return]
 
 
-def crowd(units: Loads) -> NDArray[np.float64]:
-    """Cycles that each unit waits for its neighbours."""
+@kernel
+def crowd(units: Loads) -> Any:
+    """Cycles that each unit waits for its neighbours, (units,)."""
     count, sms = len(units.sm), units.sms
     if min(count, units.places) <= sms:
         return np.zeros(count)
-    neighbours = np.partition(units.sm, count - sms)[: count - sms].sum() / sms
-    waited: NDArray[np.float64] = IN_THE_WAY * np.minimum(units.sm, neighbours)
-    return waited
+    longest_unit = units.sm.max()
+    neighbours = units.sm.sum() / sms - longest_unit  # at least: no unit is longer
+    if neighbours < longest_unit:
+        neighbours = np.partition(units.sm, count - sms)[: count - sms].sum() / sms
+    return IN_THE_WAY * np.minimum(units.sm, neighbours)
 
 
-def _holds(terms: dict[str, float], played: float, tail: float, some_idle: bool) -> str:
+@kernel
+def schedule_machine(launch: Shape, played: Played, terms: Any, way: float, machine: Any, facts: Any, row: Any) -> None:
+    """Fill in a row of ``Result`` by the schedule; ``way``: cycles before the first request and after the last."""
+    least = longest(terms, way)
+    begun = machine[M.LATENCY_BLOCK_LAUNCH_CYCLES] if launch.drawn and launch.units else 0.0
+    memory = max(terms[Term.DRAM], terms[Term.L2])
+    atomic = max(terms[Term.ATOMIC], 0.0 if launch.drawn else terms[Term.QUEUE])
+    chip = (memory, atomic, way)
+    cycles = max(least, together(played, begun + played.end, IN_THE_WAY, chip))
+    _, sms = places_of(launch, machine, facts)
+    row[Result.CYCLES] = terms[Term.LAUNCH] + cycles
+    row[Result.LOW] = terms[Term.LAUNCH] + max(least, together(played, begun + played.low, 0.0, chip))
+    row[Result.HIGH] = terms[Term.LAUNCH] + max(least, together(played, begun + played.high, 1.0, chip))
+    row[Result.TAIL_CYCLES] = max(0.0, cycles - begun - played.started)
+    row[Result.BUSY_SMS] = min(launch.units, sms)
+    row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], sms < machine[M.SM_COUNT])
+
+
+@kernel
+def together(played: Played, end: float, share: float, chip: Any) -> float:
+    """Cycles of the SMs, memory and atomic units side by side, for a share of the smaller in each other's way."""
+    if end == 0.0:
+        return 0.0
+    memory, atomic, way = chip
+    own, served = played.own, played.served
+    sms = end + share * min(min(end, memory + atomic), own)
+    dram = memory + way + share * min(min(memory, atomic + served), own)
+    locks = atomic + way + share * min(min(atomic, memory + served), own)
+    longest_side: float = max(max(sms, dram), locks)
+    return longest_side
+
+
+@kernel
+def holds(terms: Any, played: float, tail: float, some_idle: bool) -> int:
     """Name what holds: a term, or the lack of balance that the terms do not see."""
-    largest = max(terms, key=lambda name: terms[name])
-    if largest == "launch" and terms["launch"] > played:
+    largest, inner = int(np.argmax(terms)), int(np.argmax(terms[: Term.LAUNCH]))
+    if largest == Term.LAUNCH and terms[Term.LAUNCH] > played:
         return largest
-    roof = max(value for name, value in terms.items() if name != "launch")
-    if played <= EXCESS * roof:
-        return max((name for name in terms if name != "launch"), key=lambda name: terms[name])
+    if played <= EXCESS * terms[inner]:
+        return inner
     if some_idle:
-        return "balance"
-    return "tail" if tail > (played - roof) / 2 else largest
+        return Term.BALANCE
+    return TAIL if tail > (played - terms[inner]) / 2 else largest

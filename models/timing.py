@@ -23,18 +23,13 @@ class Timing:
     details : dict of str to float
         What else a fidelity has to say: ``busy_sms``, ``tail_cycles``, ``resident_blocks``.
     fidelity : str
-        The level that priced it; under ``auto`` the one that was chosen.
+        The level that priced it.
     low, high : float
         Milliseconds between which units that are in each other's way less or more often than expected put the launch
         (see ``models.schedule``); the same number where nothing spreads. It is no error of the model.
     residency : str
         Blocks that an SM holds, what keeps out one more, and the rounds in which such SMs take the grid's blocks: where
         the number of blocks, or the rounds rounded up, changes, a time may step.
-    why : str
-        Why ``auto`` chose it.
-    error_bound : float
-        How far ``cycles`` can be below those of ``schedule``, relative to the latter, by the proof of
-        ``models.fidelity_bound``; NaN where nobody asked.
     """
 
     stage: str
@@ -51,8 +46,6 @@ class Timing:
     low: float = float("nan")
     high: float = float("nan")
     residency: str = ""
-    why: str = ""
-    error_bound: float = float("nan")
 
     @property
     def terms(self) -> dict[str, float]:

@@ -14,6 +14,7 @@ if the other ran on the same SM. With S of them and units dealt at random, a seg
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch, Stream
@@ -22,8 +23,7 @@ from tilestamp.models.machine import Machine
 L1_HOLDS_LOADS = 7.0  # compute capability from which L1 keeps global loads by default; before, a cache of 48 KB or none
 
 
-@dataclass(frozen=True)
-class Traffic:
+class Traffic(NamedTuple):
     """Bytes of one launch.
 
     Parameters
@@ -59,15 +59,35 @@ def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[T
         all of them through to DRAM.
     machine : Machine
     """
-    cache = _Cache(machine.memory.l2_bytes)
-    return [_launch_traffic(_past_l1(_streams(launch), machine), cache) for launch in launches]
+    caches = caches_of(machine)
+    l2 = _Cache(caches.l2_bytes)
+    return [_launch_traffic(_past_l1(_streams(launch), caches.l1_sms), l2) for launch in launches]
 
 
-def _past_l1(streams: tuple[Stream, ...], machine: Machine) -> tuple[Stream, ...]:
-    """Streams with the bytes that come from L2, where each SM's L1 holds what that SM asked for before."""
-    if float(machine.compute_capability) < L1_HOLDS_LOADS:
+class Caches(NamedTuple):
+    """All of a machine that traffic depends on.
+
+    Parameters
+    ----------
+    l2_bytes : int
+    l1_sms : int
+        SMs whose L1 keeps what they loaded; 0: none does.
+    """
+
+    l2_bytes: int
+    l1_sms: int
+
+
+def caches_of(machine: Machine) -> Caches:
+    """The caches of a machine."""
+    keeps = float(machine.compute_capability) >= L1_HOLDS_LOADS
+    return Caches(machine.memory.l2_bytes, machine.sm.count if keeps else 0)
+
+
+def _past_l1(streams: tuple[Stream, ...], sms: int) -> tuple[Stream, ...]:
+    """Streams with the bytes that come from L2, where each of some SMs' L1 holds what that SM asked for before."""
+    if not sms:
         return streams
-    sms = machine.sm.count
     return tuple(
         replace(stream, bytes=_from_l2(stream, sms)) if stream.requested_bytes else stream for stream in streams
     )
@@ -87,7 +107,7 @@ def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:
     """Return the streams of a launch; where it names none, one for its loads and one for its stores."""
     if launch.streams or not isinstance(launch, Launch):
         return launch.streams
-    totals = launch.events.sum(axis=0)
+    totals = launch.totals
     loads, stores = int(totals[MachineEvent.LOAD_BYTES]), int(totals[MachineEvent.STORE_BYTES])
     name = f"{launch.stage}.{launch.kernel}"
     return Stream(f"{name} loads", "load", loads, loads), Stream(f"{name} stores", "store", stores, stores)

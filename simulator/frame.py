@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.machine import Machine
+from tilestamp.simulator.mixed import MixedWorks, mix_of
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 NOTHING = "nothing is visible: all of it is off screen, nearer or farther than the camera sees, culled or without area"
@@ -52,6 +54,19 @@ class Frame:
     warnings: tuple[str, ...] = ()
     tile: int = 1
     tiles_from_below: bool = False
+    _mixed: dict[tuple[str, str, int], MixedWorks] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def mixed(self, pipeline: str, machine: Machine) -> MixedWorks:
+        """Its works by the mix of a pipeline for a machine, made once for all machines of that mix.
+
+        Raises
+        ------
+        TilestampError
+            No mix.
+        """
+        mix, warp = mix_of(self.works, pipeline, machine), machine.sm.warp_size
+        key = (mix.name, mix.digest, warp) if mix else ("", "", warp)
+        return self._mixed.setdefault(key, MixedWorks(self.works, mix, warp))
 
     @property
     def remarks(self) -> tuple[str, ...]:

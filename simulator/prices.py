@@ -1,6 +1,6 @@
 """Prices: what one run takes on many machines, an array row a machine, a column a launch."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, altered, load_machine
-from tilestamp.models.timing import Timing
+from tilestamp.models.price import Fidelity, Times, check_prices, no_times, prices, taken
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Launches = list[Launch | PipeLaunch]
+TOGETHER = 64  # machines at least that a thread prices at a time
 Machines = Iterable[Machine | str | Path] | Mapping[str, ArrayLike]
 
 
@@ -96,20 +100,55 @@ def machines_of(machines: Machines, base: Machine) -> list[Machine]:
     return [load_machine(machine) for machine in machines]
 
 
-def stacked(
-    machines: Sequence[Machine],
+def prices_of(
     works: Sequence[Work | FixedFunctionWork],
-    timings: Sequence[Sequence[Timing]],
-    refusals: dict[int, str],
+    machines: Sequence[Machine],
+    launches_on: Callable[[Machine], Launches],
+    fidelity: Fidelity,
+    *,
+    skip: bool,
 ) -> Prices:
-    """Put the timings of all machines together; none where one was refused."""
+    """Price works on many machines, on all threads; see ``Run.prices``.
+
+    Parameters
+    ----------
+    works : sequence of Work or FixedFunctionWork
+    machines : sequence of Machine
+    launches_on : callable
+        Launches on a machine: the same list for all machines of one mix.
+    fidelity : {"counts", "bounds", "schedule"}
+    skip : bool
+        Whether a machine without a price is left out.
+    """
+    groups: dict[int, tuple[Launches, list[int]]] = {}
+    refusals: dict[int, str] = {}
+    for place, machine in enumerate(machines):
+        try:
+            launches = launches_on(machine)
+            check_prices(launches, machine)
+        except TilestampError as error:
+            if not skip:
+                raise
+            refusals[place] = str(error)
+        else:
+            groups.setdefault(id(launches), (launches, []))[1].append(place)
     shape = len(machines), len(works)
-    times = np.full((3, *shape), np.nan)
-    bounds = np.full(shape, "", dtype="U32")
-    for place, row in enumerate(timings):
-        for launch, timing in enumerate(row):
-            times[:, place, launch] = timing.milliseconds, timing.low, timing.high
-            bounds[place, launch] = timing.bound
+    times = no_times(shape, "")
+    for launches, places in groups.values():
+        _fill(times, launches, [machines[place] for place in places], np.array(places), fidelity)
     stages, kernels = tuple(work.stage for work in works), tuple(work.kernel for work in works)
-    milliseconds, low, high = times
-    return Prices(tuple(machines), stages, kernels, milliseconds, low, high, bounds, refusals)
+    return Prices(tuple(machines), stages, kernels, *times, refusals)
+
+
+def _fill(
+    times: Times, launches: Launches, machines: list[Machine], places: NDArray[np.intp], fidelity: Fidelity
+) -> None:
+    """Price machines of one mix in parts, side by side."""
+    machines = taken(machines)
+
+    def price_part(part: int, parts: int) -> None:
+        some = slice(part * len(machines) // parts, (part + 1) * len(machines) // parts)
+        for into, found in zip(times, prices(launches, machines[some], fidelity), strict=True):
+            into[places[some]] = found
+
+    for_parts(price_part, parts_of(len(machines), TOGETHER))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import bounds
 from tilestamp.models.counters import Counter
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import MachineEvent
@@ -16,17 +15,15 @@ from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity, price
 from tilestamp.models.remembered import priced_property
-from tilestamp.models.schedule import schedule
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest, note_run, software
-from tilestamp.simulator.mix import load_mix
-from tilestamp.simulator.prices import Machines, Prices, machines_of, stacked
+from tilestamp.simulator.prices import Machines, Prices, machines_of, prices_of
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
-from tilestamp.simulator.work import FixedFunctionWork, Work
+from tilestamp.simulator.work import Work
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,22 +82,20 @@ class Run:
         """Input index of the visible triangle, (H, W) int32, row 0 the top row, -1 where nothing was drawn."""
         return self.frame.triangle_ids
 
-    @priced_property
+    @property
     def launches(self) -> list[Launch | PipeLaunch]:
         """One for each kernel launch, in machine events."""
         self._check_counted()
-        if not any(isinstance(work, Work) for work in self.frame.works):  # fixed function alone needs no mix
-            return [work.launch() for work in self.frame.works if isinstance(work, FixedFunctionWork)]
-        return [self._launch(work) if isinstance(work, Work) else work.launch() for work in self.frame.works]
+        return self.frame.mixed(self.pipeline, self.machine).launches
 
     def _launch(self, work: Work) -> Launch:
-        """Price events in instructions; a pipeline that is fixed function throughout has no mix."""
-        return load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
+        """Price events in instructions."""
+        return self.frame.mixed(self.pipeline, self.machine).launch(work)
 
     @priced_property
     def timings(self) -> list[Timing]:
         """Time of each launch, in launch order; empty terms at fidelity ``counts``."""
-        return price(self.launches, self.machine, self.fidelity, self.error)
+        return price(self.launches, self.machine, self.fidelity)
 
     @priced_property
     def stages(self) -> "pd.DataFrame":
@@ -187,8 +182,7 @@ class Run:
             launch = replace(launch, streams=work.sample.streams(change.sum(axis=0)))
             launches = [*self.launches[:index], launch, *self.launches[index + 1 :]]
             moved = traffic(launches, self.machine)[index]
-        level = schedule if self.timings[index].fidelity == "schedule" else bounds
-        return level(launch, self.machine, moved)
+        return price([launch], self.machine, self.fidelity, [moved])[0]
 
     @cached_property
     def _traffic(self) -> list[Traffic]:
@@ -219,10 +213,7 @@ class Run:
             merging of atomics; another number of SMs, where a kernel launched a block for each.
         """
         machine = load_machine(machine)
-        persistent = any(isinstance(work, Work) and work.dispatch != "blocks" for work in self.frame.works)
-        if differences := self.machine.simt.differences(machine.simt, persistent=persistent):
-            told = ", ".join(differences)
-            raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")
+        self._check_counted_for(machine)
         return replace(self, machine=machine, fidelity=fidelity or self.fidelity)
 
     def prices(self, machines: Machines, *, skip: bool = False) -> Prices:
@@ -247,16 +238,20 @@ class Run:
             A number that no machine has; without ``skip`` also what ``on`` and ``timings`` refuse.
         """
         self._check_counted()
-        chosen, timings, refusals = machines_of(machines, self.machine), list[list[Timing]](), dict[int, str]()
-        for place, machine in enumerate(chosen):
-            try:
-                timings.append(self.on(machine).timings)
-            except TilestampError as error:
-                if not skip:
-                    raise
-                refusals[place] = str(error)
-                timings.append([])
-        return stacked(chosen, self.frame.works, timings, refusals)
+        chosen = machines_of(machines, self.machine)
+        return prices_of(self.frame.works, chosen, self._launches_on, self.fidelity, skip=skip)
+
+    def _launches_on(self, machine: Machine) -> list[Launch | PipeLaunch]:
+        """Launches on another machine; errors as of ``on``."""
+        self._check_counted_for(machine)
+        return self.frame.mixed(self.pipeline, machine).launches
+
+    def _check_counted_for(self, machine: Machine) -> None:
+        """Refuse a machine that would have counted otherwise."""
+        persistent = any(isinstance(work, Work) and work.dispatch != "blocks" for work in self.frame.works)
+        if differences := self.machine.simt.differences(machine.simt, persistent=persistent):
+            told = ", ".join(differences)
+            raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")
 
     def manifest(self) -> dict[str, Any]:
         """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""

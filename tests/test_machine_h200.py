@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
+from tests.pricing import bounds
 from tilestamp.models.atomics import add_requests
-from tilestamp.models.bounds import bounds
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import load_machine

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.pricing import bounds, schedule
 from tests.test_bounds import launch, stream
-from tilestamp.models.bounds import bounds
 from tilestamp.models.demand import demand
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.fixed_function import pipe_time
 from tilestamp.models.launch import PipeLaunch
 from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.models.schedule import schedule
 from tilestamp.models.traffic import Traffic, traffic
 
 ROUND = {  # 2 SMs at 1 GHz: a cycle is a nanosecond
@@ -53,9 +52,14 @@ MACHINE = altered(load_machine("h200"), ROUND, "assumed", "a test")
 NOTHING = Traffic(0.0, 0.0, 0.0)
 
 
-def asked(moved=NOTHING, machine=MACHINE, **description):
+def asked(load_miss=0.0, machine=MACHINE, **description):
     """Demand of each unit."""
-    return demand(launch(**{"units": 1, "block": 128, **description}), machine, moved)
+    return demand(launch(**{"units": 1, "block": 128, **description}), machine, load_miss)
+
+
+def terms(moved=NOTHING, machine=MACHINE, **description):
+    """Cycles of each term of one unit."""
+    return bounds(launch(**{"units": 1, "block": 128, **description}), machine, moved).term_cycles
 
 
 def test_four_schedulers_share_the_instructions_of_four_warps():
@@ -101,7 +105,7 @@ def test_stores_take_the_load_path_at_their_own_rate():
 
 def test_l2_takes_stores_at_their_own_rate():
     moved = Traffic(0.0, 640.0, 0.0, written_bytes=160.0)
-    assert asked(moved, LOAD_BYTES=480, STORE_BYTES=160).l2 == (640 - 160) / 64 + 160 / 16
+    assert terms(moved, LOAD_BYTES=480, STORE_BYTES=160)["l2"] == (640 - 160) / 64 + 160 / 16
 
 
 def test_an_sm_sends_atomics_at_its_own_rate():
@@ -110,28 +114,34 @@ def test_an_sm_sends_atomics_at_its_own_rate():
 
 
 def test_the_chip_serves_atomics_at_its_own_rate():
-    assert asked(ATOMIC_REQUESTS=40, CHAIN_ATOMIC=1).atomic == 40 / 2
-    assert asked(ATOMIC_REQUESTS=40).atomic == 40 / 4
+    assert terms(ATOMIC_REQUESTS=40, CHAIN_ATOMIC=1)["atomic"] == 40 / 2
+    assert terms(ATOMIC_REQUESTS=40)["atomic"] == 40 / 4
 
 
 def test_where_blind_atomics_are_no_faster_all_go_at_one_rate():
     alike = altered(MACHINE, {"atomics.unawaited_per_clock": 0.0}, "assumed", "a test")
-    assert asked(machine=alike, ATOMIC_REQUESTS=40).atomic == 40 / 2
+    assert terms(machine=alike, ATOMIC_REQUESTS=40)["atomic"] == 40 / 2
 
 
-def test_bytes_are_shared_by_what_each_unit_moves():
-    what = launch(units=2, LOAD_BYTES=100)
-    what.events[1, E.STORE_BYTES] = 200
-    units = demand(what, MACHINE, Traffic(800.0, 640.0, 0.0))
-    assert units.dram.tolist() == [800 / 50 / 4, 800 / 50 * 3 / 4]  # 100 GB/s, of which half: 50 bytes a cycle
-    assert units.l2.tolist() == [2.5, 7.5]
+def test_dram_moves_its_bytes_at_what_it_sustains():
+    assert terms(Traffic(800.0, 640.0, 0.0))["dram"] == 800 / 50  # 100 GB/s, of which half: 50 bytes a cycle
 
 
-def test_the_fullest_atomic_unit_is_shared_by_requests():
+def test_the_fullest_atomic_unit_serves_its_requests():
     """Chunks of 32 bytes; the unit of the first ten chunks is one."""
-    what = launch(units=2, ATOMIC_REQUESTS=10, requests=np.array([12, 8]))
-    what.events[1, E.ATOMIC_REQUESTS] = 30
-    assert demand(what, MACHINE, NOTHING).queue == pytest.approx([20 * 3 / 4, 20 * 3 * 3 / 4])
+    assert terms(ATOMIC_REQUESTS=10, requests=np.array([12, 8]))["queue"] == pytest.approx(20 * 3)
+
+
+@pytest.mark.parametrize(("sent", "begun"), [((10, 30), 15), ((30, 10), 45)])
+def test_draws_are_shared_by_requests(sent, begun):
+    """The first of two items takes 300 cycles from when its part of 20 requests of 3 cycles each has passed.
+
+    All units together serve 4 requests a cycle: half of those 10 cycles are in the way.
+    """
+    what = launch(units=2, block=32, dispatch="block_queue", FP32=100, requests=np.array([12, 8]))
+    what.events[:, E.ATOMIC_REQUESTS] = sent
+    what.events[0, E.FP32] = 300
+    assert schedule(what, MACHINE, NOTHING).cycles == pytest.approx(2000 + 40 + begun + 300 + 10 / 2)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +162,7 @@ def test_dependent_steps_wait_one_after_another(events, cycles):
 
 
 def test_a_load_waits_for_dram_by_the_share_that_misses():
-    assert asked(Traffic(0.0, 0.0, 0.25), CHAIN_LOAD=1).chain == 40 + 100 + 400 / 4
+    assert asked(0.25, CHAIN_LOAD=1).chain == 40 + 100 + 400 / 4
 
 
 def test_a_kernel_without_work_takes_its_launch():

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models.bounds import bounds
+from tests.pricing import bounds, schedule
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.models.schedule import schedule
 from tilestamp.models.traffic import Traffic
 
 GTX280 = altered(

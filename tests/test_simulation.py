@@ -70,7 +70,7 @@ def test_cameras_are_taken_as_matrices_and_objects(camera):
         ({"height": True}, "height takes"),
         ({"width": 10**12}, "width takes a whole number of 1 or more that fits in 32 bits"),
         ({"width": 10**9, "height": 10**9}, "memory"),
-        ({"fidelity": "exact"}, "fidelity takes counts, bounds, auto or schedule, not 'exact'"),
+        ({"fidelity": "exact"}, "fidelity takes counts, bounds or schedule, not 'exact'"),
         ({"error": "small"}, "error takes a number from 0 to below 1, not 'small'"),
         ({"seed": -1}, "seed takes"),
         ({"picture": "no"}, "picture takes true or false, not 'no'"),

@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models.bounds import bounds
+from tests.pricing import bounds, schedule
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.list_schedule import list_schedule
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.models.schedule import schedule
 from tilestamp.models.traffic import Traffic, traffic
 
 MACHINES = [load_machine(name) for name in ("gtx280", "gtx480", "gtx680", "h200")]

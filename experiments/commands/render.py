@@ -28,7 +28,7 @@ def render(
     machine: str = "gtx280",
     size: str = "1024x768",
     camera: str | None = None,
-    fidelity: Literal["counts", "bounds", "auto", "schedule"] = "schedule",
+    fidelity: Literal["counts", "bounds", "schedule"] = "schedule",
     error: float = 0.0,
     seed: int = 0,
     counting: bool = True,
@@ -54,8 +54,7 @@ def render(
     camera
         A view of the scene by name, or a JSON file (`FILE.json`, `FILE.json:KEY`).
     fidelity
-        counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine; auto:
-        for each launch bounds where that is proved near enough to schedule, elsewhere schedule.
+        counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine.
     error
         Relative error that will do, such as 0.01: expensive stages execute a random part of their blocks, every number
         gets its 95 % interval, and there is no picture.

@@ -19,8 +19,6 @@ TIME = {  # after them
     "occupancy": ".2f",
     "milliseconds": ".3f",
     "bound": "s",
-    "fidelity": "s",
-    "why": "s",
 }
 
 

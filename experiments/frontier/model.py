@@ -10,7 +10,7 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from tilestamp.experiments.frontier.model_frames import Timed, frames, is_long, warnings
-from tilestamp.experiments.frontier.model_notes import AUTO, BOUNDS, COUNTS, FULL, notes
+from tilestamp.experiments.frontier.model_notes import BOUNDS, COUNTS, FULL, notes
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -30,7 +30,7 @@ SOURCE = (
     "Clock: this computer. Times of frames: Eisenacher & Loop 2010, Laine & Karras 2011, an H200. Other simulators: as "
     "published (detailed_simulators.csv names each source)"
 )
-FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "auto": AUTO, "counts": COUNTS}
+FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "counts": COUNTS}
 RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
 SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
 EXECUTED = "ours, all units executed"
@@ -46,7 +46,6 @@ class Answer:
     pricing_seconds: float  # of them
     milliseconds: float
     instructions: float
-    played: str = ""  # launches that auto escalated, of all
 
 
 def run(progress: Progress) -> Result:
@@ -106,11 +105,8 @@ def _priced(frame: Timed, drawn: Run, fidelity: Fidelity, method: str, seconds: 
         run = drawn.on(drawn.machine, fidelity)
         milliseconds = frame.milliseconds_of(run)
         quickest = min(quickest, time.process_time() - start)
-    played = sum(t.fidelity == "schedule" for t in run.timings)
     warps = [launch.events[:, list(INSTRUCTION_CLASSES)].sum() for launch in run.launches if isinstance(launch, Launch)]
-    return Answer(
-        method, seconds + quickest, quickest, milliseconds, float(sum(warps)), f"{played} of {len(run.timings)}"
-    )
+    return Answer(method, seconds + quickest, quickest, milliseconds, float(sum(warps)))
 
 
 def _rows(frame: Timed, answers: list[Answer]) -> list[dict[str, Any]]:

@@ -65,8 +65,7 @@ class Timed:
         small = self.arguments | {"width": 64, "height": 48, "camera": None}
         for asked in (0.0, error):
             run = simulate("teapot", self.pipeline, self.machine, picture=False, **small, error=asked)
-            for fidelity in ("auto", "schedule"):
-                self.milliseconds_of(run.on(run.machine, fidelity))
+            self.milliseconds_of(run)
 
 
 def is_long() -> bool:

@@ -2,12 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from tilestamp.models.auto import ERROR
-
 if TYPE_CHECKING:
     import pandas as pd
 
-FULL, BOUNDS, AUTO, COUNTS = (f"{fidelity}, all units" for fidelity in ("schedule", "bounds", "auto", "counts"))
+FULL, BOUNDS, COUNTS = (f"{fidelity}, all units" for fidelity in ("schedule", "bounds", "counts"))
 
 
 def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.DataFrame") -> list[str]:
@@ -26,7 +24,6 @@ def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", b
     """
     return [
         _about(table, ours),
-        _about_auto(table, ours),
         *_about_sampling(ours),
         *_about_others(ours, theirs, beside),
     ]
@@ -42,17 +39,6 @@ def _about(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
         f"{full.cpu_seconds:.2f} s a frame. {full.pricing_seconds * 1e3:.0f} ms of them price the counts, the "
         f"rest executes: counts alone, without any time, still take {counts.cpu_seconds:.2f} s. Pricing by bounds "
         f"takes {bounds.pricing_seconds * 1e3:.0f} ms and is {_off(bounds)}."
-    )
-
-
-def _about_auto(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
-    auto = ours.set_index("method").loc[AUTO]
-    shares = [share.split(" of ") for share in table[table.method == AUTO].played]
-    played, launches = (sum(int(share[i]) for share in shares) for i in (0, 1))
-    return (
-        f"Auto was asked for {ERROR:.0%}. It left {launches - played} of {launches} launches at their roofline, proved "
-        f"near enough or too small to matter, and played the other {played}; it prices a frame in "
-        f"{auto.pricing_seconds * 1e3:.0f} ms and is {_off(auto)}."
     )
 
 

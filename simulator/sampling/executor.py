@@ -11,7 +11,6 @@ from tilestamp.models.demand import demand
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Stream
 from tilestamp.models.machine import Machine
-from tilestamp.models.traffic import Traffic
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.sampling.estimate import Floats, Integers
@@ -119,7 +118,7 @@ class SampledExecutor(Executor):
         rows = part.sample.rows
         work = replace(part.stage.work(rows, **part.inputs), table=rows, streams=())
         launch = load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
-        asked = demand(launch, self.machine, Traffic(0.0, 0.0, 1.0))
+        asked = demand(launch, self.machine, 1.0)
         counts = [rows[:, work.events[counter.event]] for counter in work.counters if counter.kind == "count"]
         instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
         return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)

@@ -1,0 +1,87 @@
+"""A batch: machines to price the same launches on, and what they have in common.
+
+Of a launch three facts differ from machine to machine and are no number of either: the blocks that an SM holds, what
+the caches move, and the fullest atomic unit. Each follows from a few numbers of a machine, its key, and is made once
+for all machines that have the same. What makes it takes of a machine no more than the key, so that nothing can be
+missing there.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.atomic_units import dealing_of, fullest_requests
+from tilestamp.models.bounds import COLUMNS, Fact
+from tilestamp.models.launch import Launch, PipeLaunch
+from tilestamp.models.launch_prices import launch_prices
+from tilestamp.models.machine import Machine
+from tilestamp.models.numbers import Number, numbers_of
+from tilestamp.models.occupancy import holding_of, residency
+from tilestamp.models.traffic import Traffic, caches_of, traffic
+
+T = TypeVar("T")
+
+
+class Batch:
+    """Machines side by side.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+    """
+
+    def __init__(self, machines: Sequence[Machine]) -> None:
+        self.machines = machines
+        self.numbers = numbers_of(machines)
+        self._order = np.lexsort(self.numbers.T[::-1])  # machines that share work side by side
+        self._holding, self._caches, self._dealing = (_Shared(machines, k) for k in (holding_of, caches_of, dealing_of))
+
+    @property
+    def clock_hz(self) -> NDArray[np.float64]:
+        """Issue clocks in Hz, (machines,)."""
+        return self.numbers[:, Number.SM_CLOCK_MHZ] * 1e6
+
+    def traffic(self, launches: Sequence[Launch | PipeLaunch]) -> list[list[Traffic]]:
+        """Bytes of each launch of a frame, a list with an entry a machine."""
+        moved = [traffic(launches, machine) for machine in self._caches.machines]
+        return [self._caches.each(launch) for launch in zip(*moved, strict=True)]
+
+    def prices(self, launch: Launch, moved: Sequence[Traffic], *, scheduled: bool) -> NDArray[np.float64]:
+        """Price one launch, (machines, COLUMNS); see ``launch_prices``.
+
+        Parameters
+        ----------
+        launch : Launch
+        moved : sequence of Traffic
+            Its bytes on each machine.
+        scheduled : bool
+
+        Raises
+        ------
+        TilestampError
+            A block that a machine cannot launch.
+        """
+        facts = np.empty((len(self.machines), len(Fact)))
+        facts[:, Fact.DRAM_BYTES : Fact.WRITTEN_BYTES + 1] = moved
+        held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
+        facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
+        fullest = [fullest_requests(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
+        facts[:, Fact.FULLEST_REQUESTS] = self._dealing.each(fullest)
+        prices = np.empty((len(self.machines), COLUMNS))
+        prices[self._order] = launch_prices(launch, self.numbers[self._order], facts[self._order], scheduled=scheduled)
+        return prices
+
+
+class _Shared:
+    """What some machines have in common: one of them for each key, and who has the same."""
+
+    def __init__(self, machines: Sequence[Machine], key: Callable[[Machine], Hashable]) -> None:
+        places: dict[Hashable, int] = {}
+        self._which = [places.setdefault(key(machine), len(places)) for machine in machines]
+        self.machines = [machines[self._which.index(place)] for place in range(len(places))]
+
+    def each(self, values: Sequence[T]) -> list[T]:
+        """Give each machine the value of its key's."""
+        return [values[place] for place in self._which]
