@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from tilestamp.models.demand import Demand, atomic_rate
+from tilestamp.models.demand import Whole, atomic_rate
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
@@ -86,13 +86,13 @@ def places_of(launch: Shape, machine: Any, facts: Any) -> tuple[int, int]:
 
 
 @kernel
-def bound_terms(launch: Shape, units: Demand, totals: Any, machine: Any, facts: Any) -> Any:
+def bound_terms(launch: Shape, units: Whole, totals: Any, machine: Any, facts: Any) -> Any:
     """Cycles of each term, (len(Term),).
 
     Parameters
     ----------
     launch : Shape
-    units : Demand
+    units : Whole
     totals : ndarray, (len(MachineEvent),)
         Events of all units.
     machine : ndarray, (len(Number),)
@@ -101,11 +101,10 @@ def bound_terms(launch: Shape, units: Demand, totals: Any, machine: Any, facts: 
     terms = np.zeros(TAIL)
     places, busy = places_of(launch, machine, facts)
     sms = machine[M.SM_COUNT]
-    issue, shared, l1, chain = units.issue.sum(), units.shared.sum(), units.l1.sum(), units.chain.sum()
-    terms[Term.ISSUE], terms[Term.SHARED], terms[Term.L1] = issue / sms, shared / sms, l1 / sms
+    terms[Term.ISSUE], terms[Term.SHARED], terms[Term.L1] = units.issue / sms, units.shared / sms, units.l1 / sms
     if min(busy, launch.units) < sms:
-        terms[Term.BALANCE] = max(max(issue, shared), l1) / max(1, min(busy, launch.units))
-    terms[Term.LATENCY] = chain / max(1, min(places, launch.units))
+        terms[Term.BALANCE] = max(max(units.issue, units.shared), units.l1) / max(1, min(busy, launch.units))
+    terms[Term.LATENCY] = units.chain / max(1, min(places, launch.units))
     if launch.units:
         _chip_terms(terms, totals, machine, facts)
     if not launch.drawn:
@@ -143,7 +142,7 @@ def longest(terms: Any, way: float) -> float:
 
 
 @kernel
-def bound_machine(terms: Any, way: float, row: Any) -> None:
+def bound_launch(terms: Any, way: float, row: Any) -> None:
     """Fill in a row of ``Result`` by the roofline."""
     cycles = terms[Term.LAUNCH] + longest(terms, way)
     row[Result.CYCLES] = row[Result.LOW] = row[Result.HIGH] = cycles

@@ -80,6 +80,24 @@ class Demand(NamedTuple):
     alone: Cycles
 
 
+class Whole(NamedTuple):
+    """Cycles of all units together.
+
+    Parameters
+    ----------
+    issue, shared, l1, chain : float
+        Sums.
+    way : float
+        The shortest chain; 0 where there is no unit.
+    """
+
+    issue: float
+    shared: float
+    l1: float
+    chain: float
+    way: float
+
+
 def demand(launch: Launch, machine: Machine, load_miss: float) -> Demand:
     """Cycles that each unit of a launch asks for.
 
@@ -172,8 +190,8 @@ def atomic_rate(totals: Any, awaited: float, unawaited: float) -> float:
 
 
 @kernel
-def demands(events: Any, matrix: Any, found: Demand) -> None:
-    """Fill in what each unit asks for.
+def demands(events: Any, matrix: Any, found: Demand) -> Whole:
+    """Fill in what each unit asks for, and sum up.
 
     Parameters
     ----------
@@ -185,6 +203,8 @@ def demands(events: Any, matrix: Any, found: Demand) -> None:
     """
     units, others = events.shape[1], matrix[Sum.OTHERS]
     sums = np.empty((SUMS, TOGETHER))
+    issues = shareds = l1s = chains = 0.0
+    way = np.inf if units else 0.0
     for first in range(0, units, TOGETHER):
         last = min(units, first + TOGETHER)
         _sum_up(events[:, first:last], matrix, sums)
@@ -192,14 +212,14 @@ def demands(events: Any, matrix: Any, found: Demand) -> None:
             row, unit = sums[:, i], first + i
             pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
             issue = max(row[Sum.DISPATCH], pipe)
-            chain = row[Sum.CHAIN] + others[Other.START]
             scattered = min(row[Sum.STORED], row[Sum.SCATTERED])
-            local = (row[Sum.STORED] - scattered) * others[Other.LOCAL]
-            found.issue[unit] = issue
-            found.shared[unit] = row[Sum.SHARED]
-            found.l1[unit] = row[Sum.L1] + scattered * others[Other.SCATTERED] + local
-            found.chain[unit] = chain
+            stored = scattered * others[Other.SCATTERED] + (row[Sum.STORED] - scattered) * others[Other.LOCAL]
+            shared, l1, chain = row[Sum.SHARED], row[Sum.L1] + stored, row[Sum.CHAIN] + others[Other.START]
+            found.issue[unit], found.shared[unit], found.l1[unit], found.chain[unit] = issue, shared, l1, chain
             found.alone[unit] = max(chain, issue * others[Other.SPREAD])
+            issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
+            way = min(way, chain)
+    return Whole(issues, shareds, l1s, chains, way)
 
 
 @kernel

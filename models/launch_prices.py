@@ -1,17 +1,18 @@
 """The prices of one launch on many machines: demands, terms and schedule, one after another, in one kernel."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, Fact, bound_machine, bound_terms
-from tilestamp.models.demand import SUMS, Demand, demands, rates
+from tilestamp.models.bounds import COLUMNS, TAIL, Fact, bound_launch, bound_terms
+from tilestamp.models.demand import SUMS, Demand, Whole, demands, rates
 from tilestamp.models.events import EVENTS
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch, Shape
-from tilestamp.models.schedule import load_units, loads, play, schedule_machine
+from tilestamp.models.numbers import Number as M
+from tilestamp.models.schedule import Loads, load_units, loads, schedule_launch
 
 
 def launch_prices(
@@ -38,25 +39,51 @@ def launch_prices(
     return prices
 
 
+class Opened(NamedTuple):
+    """What the price of one launch on one machine is made of.
+
+    Parameters
+    ----------
+    units : Demand
+    terms : ndarray, (len(Term),)
+        Cycles.
+    loads : Loads
+    """
+
+    units: Demand
+    terms: NDArray[np.float64]
+    loads: Loads
+
+
+def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np.float64]) -> Opened:
+    """What the price of one launch on one machine is made of; parameters as a row of those of ``launch_prices``."""
+    found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
+    units = np.empty(len(launch.events)), np.empty(len(launch.events))
+    whole = demands(launch.columns, rates(launch.shape, machine, facts[Fact.LOAD_MISS], launch.totals), found)
+    load_units(found, *units)
+    terms = bound_terms(launch.shape, whole, launch.totals, machine, facts)
+    loaded = loads(launch.shape, units, launch.columns[E.ATOMIC_REQUESTS], terms, whole.way, machine, facts)
+    return Opened(found, terms, loaded)
+
+
 @kernel
 def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, scheduled: bool, prices: Any) -> None:
-    """Fill in all rows; units are looked at anew where their demands, or what starts them, are others."""
+    """Fill in all rows; what units ask for is made anew where the rates are others."""
     count = launch.units
     units = Demand(np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count))
     sm, alone = np.empty(count), np.empty(count)
-    seen = np.full((SUMS, EVENTS), np.nan)
+    seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
         matrix = rates(launch, machine, fact[Fact.LOAD_MISS], totals)
         if (matrix != seen).any():
-            demands(events, matrix, units)
+            whole = demands(events, matrix, units)
             load_units(units, sm, alone)
             seen = matrix
-        terms = bound_terms(launch, units, totals, machine, fact)
-        row[: len(terms)] = terms
-        way = units.chain.min() if count else 0.0
+        terms = bound_terms(launch, whole, totals, machine, fact)
+        row[:TAIL] = terms
         if scheduled:
-            played = play(loads(launch, sm, alone, events[E.ATOMIC_REQUESTS], terms, machine, fact))
-            schedule_machine(launch, played, terms, way, machine, fact, row)
+            loaded = loads(launch, (sm, alone), events[E.ATOMIC_REQUESTS], terms, whole.way, machine, fact)
+            schedule_launch(loaded, terms, loaded.sms < machine[M.SM_COUNT], row)
         else:
-            bound_machine(terms, way, row)
+            bound_launch(terms, whole.way, row)

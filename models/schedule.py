@@ -45,7 +45,7 @@ IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often 
 
 
 class Loads(NamedTuple):
-    """What the units of a launch load the SMs with; arrays have a row a unit, in cycles.
+    """What the units of a launch load the machine with; arrays have a row a unit, in cycles.
 
     Parameters
     ----------
@@ -63,6 +63,12 @@ class Loads(NamedTuple):
         Cycles from one start to the next; 0 where units are drawn from a queue.
     start : float
         Cycles from a free place to the first instruction of the block put there; 0 where units are drawn.
+    begun : float
+        Cycles before persistent blocks draw their first units.
+    memory, atomic : float
+        Cycles of the fuller of DRAM and L2, and of the atomic units; draws are not among them.
+    way : float
+        Cycles before their first request and after their last.
     """
 
     sm: NDArray[np.float64]
@@ -72,6 +78,10 @@ class Loads(NamedTuple):
     sms: int
     interval: float
     start: float
+    begun: float
+    memory: float
+    atomic: float
+    way: float
 
 
 class Played(NamedTuple):
@@ -107,37 +117,46 @@ def load_units(units: Demand, sm: Any, alone: Any) -> None:
 
 
 @kernel
-def loads(launch: Shape, sm: Any, alone: Any, requests: Any, terms: Any, machine: Any, facts: Any) -> Loads:
-    """What the units of a launch load the SMs with.
+def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, machine: Any, facts: Any) -> Loads:
+    """What the units of a launch load the machine with.
 
     Parameters
     ----------
     launch : Shape
-    sm, alone : ndarray, (units,)
-        From ``load_units``.
+    units : tuple of two ndarrays, (units,)
+        ``Loads.sm`` and ``Loads.alone``.
     requests : ndarray, (units,)
         Atomic requests.
     terms : ndarray, (len(Term),)
+    way : float
+        The shortest chain.
     machine : ndarray, (len(Number),)
     facts : ndarray, (len(Fact),)
     """
+    count, (sm, alone) = launch.units, units
     places, sms = places_of(launch, machine, facts)
-    draws = np.empty(launch.units if launch.drawn else 0)
-    if len(draws):
-        total = requests.sum()
-        for i in range(launch.units):
-            draws[i] = terms[Term.QUEUE] * (requests[i] / total if total > 0 else 1.0 / launch.units)
-    start = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
-    return Loads(sm, alone, draws, places, sms, terms[Term.START] / max(1, launch.units), start)
+    start = machine[M.LATENCY_BLOCK_LAUNCH_CYCLES] if count else 0.0
+    memory = max(terms[Term.DRAM], terms[Term.L2])
+    if not launch.drawn:
+        atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
+        return Loads(
+            sm, alone, np.empty(0), places, sms, terms[Term.START] / max(1, count), start, 0.0, memory, atomic, way
+        )
+    total = requests.sum()
+    draws = requests * (terms[Term.QUEUE] / total) if total > 0 else np.full(count, terms[Term.QUEUE] / max(1, count))
+    return Loads(sm, alone, draws, places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
 
 
 @kernel
 def play(units: Loads) -> Played:
     """Work the units off."""
-    extra = crowd(units)
-    own, more = units.alone.sum(), extra.sum()
-    mean, served = own / max(1, len(extra)), units.sm.sum() / units.sms
-    end, started = _ends(units, units.alone + extra, units.places)
+    own = served = 0.0
+    for i in range(len(units.sm)):
+        own += units.alone[i]
+        served += units.sm[i]
+    mean, served = own / max(1, len(units.sm)), served / units.sms
+    crowded, more = crowd(units)
+    end, started = _ends(units, crowded, units.places)
     waited = end * more / (own + more) if more else 0.0
     if more and own / units.sms < end + waited:
         lonely, lonely_started = _ends(units, units.alone, units.sms)
@@ -152,46 +171,51 @@ def _ends(units: Loads, alone: Any, places: int) -> tuple[float, float]:
 
 
 @kernel
-def crowd(units: Loads) -> Any:
-    """Cycles that each unit waits for its neighbours, (units,)."""
+def crowd(units: Loads) -> tuple[Any, float]:
+    """What each unit takes by itself and waits for its neighbours, (units,), and the cycles that all wait."""
+    if min(len(units.sm), units.places) <= units.sms:
+        return units.alone, 0.0
+    work, crowded, waited = _neighbours(units), np.empty(len(units.sm)), 0.0
+    for i in range(len(units.sm)):
+        wait = IN_THE_WAY * min(units.sm[i], work)
+        crowded[i] = units.alone[i] + wait
+        waited += wait
+    return crowded, waited
+
+
+@kernel
+def _neighbours(units: Loads) -> float:
+    """Work of a unit's neighbours on its SM; of more than the longest unit's own it does not matter how much."""
     count, sms = len(units.sm), units.sms
-    if min(count, units.places) <= sms:
-        return np.zeros(count)
-    longest_unit = units.sm.max()
-    neighbours = units.sm.sum() / sms - longest_unit  # at least: no unit is longer
-    if neighbours < longest_unit:
-        neighbours = np.partition(units.sm, count - sms)[: count - sms].sum() / sms
-    return IN_THE_WAY * np.minimum(units.sm, neighbours)
+    longest_unit, work = units.sm.max(), units.sm.sum()
+    if work >= 2 * sms * longest_unit:
+        return longest_unit  # type: ignore[no-any-return]
+    return np.partition(units.sm, count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
 
 
 @kernel
-def schedule_machine(launch: Shape, played: Played, terms: Any, way: float, machine: Any, facts: Any, row: Any) -> None:
-    """Fill in a row of ``Result`` by the schedule; ``way``: cycles before the first request and after the last."""
-    least = longest(terms, way)
-    begun = machine[M.LATENCY_BLOCK_LAUNCH_CYCLES] if launch.drawn and launch.units else 0.0
-    memory = max(terms[Term.DRAM], terms[Term.L2])
-    atomic = max(terms[Term.ATOMIC], 0.0 if launch.drawn else terms[Term.QUEUE])
-    chip = (memory, atomic, way)
-    cycles = max(least, together(played, begun + played.end, IN_THE_WAY, chip))
-    _, sms = places_of(launch, machine, facts)
-    row[Result.CYCLES] = terms[Term.LAUNCH] + cycles
-    row[Result.LOW] = terms[Term.LAUNCH] + max(least, together(played, begun + played.low, 0.0, chip))
-    row[Result.HIGH] = terms[Term.LAUNCH] + max(least, together(played, begun + played.high, 1.0, chip))
-    row[Result.TAIL_CYCLES] = max(0.0, cycles - begun - played.started)
-    row[Result.BUSY_SMS] = min(launch.units, sms)
-    row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], sms < machine[M.SM_COUNT])
+def schedule_launch(units: Loads, terms: Any, some_idle: bool, row: Any) -> None:
+    """Fill in a row of ``Result`` by the schedule; ``some_idle``: whether an SM gets nothing."""
+    least, before = longest(terms, units.way), terms[Term.LAUNCH]
+    played = play(units)
+    cycles = max(least, together(units, played, units.begun + played.end, IN_THE_WAY))
+    row[Result.CYCLES] = before + cycles
+    row[Result.LOW] = before + max(least, together(units, played, units.begun + played.low, 0.0))
+    row[Result.HIGH] = before + max(least, together(units, played, units.begun + played.high, 1.0))
+    row[Result.TAIL_CYCLES] = max(0.0, cycles - units.begun - played.started)
+    row[Result.BUSY_SMS] = min(len(units.sm), units.sms)
+    row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], some_idle)
 
 
 @kernel
-def together(played: Played, end: float, share: float, chip: Any) -> float:
+def together(units: Loads, played: Played, end: float, share: float) -> float:
     """Cycles of the SMs, memory and atomic units side by side, for a share of the smaller in each other's way."""
     if end == 0.0:
         return 0.0
-    memory, atomic, way = chip
-    own, served = played.own, played.served
+    memory, atomic, own = units.memory, units.atomic, played.own
     sms = end + share * min(min(end, memory + atomic), own)
-    dram = memory + way + share * min(min(memory, atomic + served), own)
-    locks = atomic + way + share * min(min(atomic, memory + served), own)
+    dram = memory + units.way + share * min(min(memory, atomic + played.served), own)
+    locks = atomic + units.way + share * min(min(atomic, memory + played.served), own)
     longest_side: float = max(max(sms, dram), locks)
     return longest_side
 
