@@ -49,14 +49,19 @@ class Batch:
         return [self._caches.each(launch) for launch in zip(*moved, strict=True)]
 
     def prices(self, launch: Launch, moved: Sequence[Traffic], *, scheduled: bool) -> NDArray[np.float64]:
-        """Price one launch, (machines, COLUMNS); see ``launch_prices``.
+        """Price one launch, (machines, COLUMNS); see ``launch_prices`` and ``facts``."""
+        facts, prices = self.facts(launch, moved), np.empty((len(self.machines), COLUMNS))
+        prices[self._order] = launch_prices(launch, self.numbers[self._order], facts[self._order], scheduled=scheduled)
+        return prices
+
+    def facts(self, launch: Launch, moved: Sequence[Traffic]) -> NDArray[np.float64]:
+        """Facts of one launch, (machines, len(Fact)).
 
         Parameters
         ----------
         launch : Launch
         moved : sequence of Traffic
             Its bytes on each machine.
-        scheduled : bool
 
         Raises
         ------
@@ -64,14 +69,12 @@ class Batch:
             A block that a machine cannot launch.
         """
         facts = np.empty((len(self.machines), len(Fact)))
-        facts[:, Fact.DRAM_BYTES : Fact.WRITTEN_BYTES + 1] = moved
         held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
         facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
+        facts[:, Fact.DRAM_BYTES : Fact.WRITTEN_BYTES + 1] = moved
         fullest = [fullest_requests(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
         facts[:, Fact.FULLEST_REQUESTS] = self._dealing.each(fullest)
-        prices = np.empty((len(self.machines), COLUMNS))
-        prices[self._order] = launch_prices(launch, self.numbers[self._order], facts[self._order], scheduled=scheduled)
-        return prices
+        return facts
 
 
 class _Shared:

@@ -207,7 +207,7 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
     way = np.inf if units else 0.0
     for first in range(0, units, TOGETHER):
         last = min(units, first + TOGETHER)
-        _sum_up(events[:, first:last], matrix, sums)
+        _sum_up(events, first, last, matrix, sums)
         for i in range(last - first):
             row, unit = sums[:, i], first + i
             pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
@@ -223,15 +223,15 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
 
 
 @kernel
-def _sum_up(events: Any, matrix: Any, sums: Any) -> None:
-    """Product of a matrix that is mostly empty and of events that are a column each."""
-    units = events.shape[1]
+def _sum_up(events: Any, first: int, last: int, matrix: Any, sums: Any) -> None:
+    """Product of a matrix that is mostly empty and of events that are a column each, for some units."""
+    units = last - first
     for row in range(Sum.OTHERS):
         into = sums[row]
         into[:units] = 0.0
         for column in range(EVENTS):
             rate = matrix[row, column]
             if rate:
-                counts = events[column]
+                counts = events[column, first:last]
                 for i in range(units):
                     into[i] += rate * counts[i]

@@ -17,18 +17,21 @@ def list_schedule(
 ) -> tuple[float, float]:
     """End of all units; the start of the one that ends last.
 
-    ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before.
+    ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
+    there are no more places than SMs, an SM has always served it by then.
     """
     units = len(alone)
-    free, free_who = tournament(places if units > places else 1)
-    served, served_who = tournament(min(sms, units))
+    waits, shares = units > places, places > sms < units
+    free, free_who = tournament(places if waits else 1)
+    served, served_who = tournament(sms if shares else 1)
     drawn = end = last_start = 0.0
     for i in range(units):
         begun = i * interval
         if i >= places:
             begun = max(begun, free[0])
         done = max(served[0], begun + start) + sm[i]
-        replay(served, served_who, done)
+        if shares:
+            replay(served, served_who, done)
         begin = begun
         if len(draws) > 0:
             drawn = max(drawn, begun) + draws[i]
@@ -36,7 +39,7 @@ def list_schedule(
         done = max(done, begin + alone[i])
         if done > end:
             end, last_start = done, begun
-        if units > places:
+        if waits:
             replay(free, free_who, done)
     return end, last_start
 

@@ -14,6 +14,7 @@ from tilestamp.models.bounds import HOLDS, Result, Term
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fixed_function import check_pipe, pipe_time
 from tilestamp.models.launch import Launch, PipeLaunch
+from tilestamp.models.launch_prices import Opened, launch_loads
 from tilestamp.models.machine import Machine
 from tilestamp.models.occupancy import Residency, residency
 from tilestamp.models.timing import Timing
@@ -102,6 +103,15 @@ def no_times(shape: tuple[int, int], bound: str) -> Times:
     """Times that are not known yet, (machines, launches)."""
     milliseconds, low, high = np.full((3, *shape), np.nan)
     return Times(milliseconds, low, high, np.full(shape, bound, "U32"))
+
+
+def opened(launch: Launch, machine: Machine, moved: Traffic) -> Opened:
+    """What the price of one launch is made of: demands, terms, loads.
+
+    ``models.schedule.play`` works the loads off; parameters and errors as of ``price``.
+    """
+    batch = Batch([machine])
+    return launch_loads(launch, batch.numbers[0], batch.facts(launch, [moved])[0])
 
 
 def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> None:

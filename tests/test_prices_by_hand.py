@@ -5,12 +5,15 @@ import pytest
 
 from tests.pricing import bounds, schedule
 from tests.test_bounds import launch, stream
+from tilestamp.models.bounds import Term
 from tilestamp.models.demand import demand
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.fixed_function import pipe_time
 from tilestamp.models.launch import PipeLaunch
 from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import altered, load_machine
+from tilestamp.models.price import opened
+from tilestamp.models.schedule import play
 from tilestamp.models.traffic import Traffic, traffic
 
 ROUND = {  # 2 SMs at 1 GHz: a cycle is a nanosecond
@@ -194,6 +197,15 @@ def test_draws_from_a_queue_pass_its_atomic_unit_one_by_one():
     what = launch(units=4, block=32, dispatch="block_queue", FP32=100, ATOMIC_REQUESTS=1, requests=np.array([4]))
     what = type(what)(**{**vars(what), "grid": 2})
     assert schedule(what, slow, NOTHING).cycles == pytest.approx(2000 + 40 + 4 * 300 + 100, abs=1)
+
+
+def test_what_a_price_is_made_of_makes_the_price():
+    """Three blocks on two SMs, an SM holds one: the third starts as the first ends."""
+    what = launch(units=3, block=128, FP32=400, CHAIN_LOAD=10)
+    parts = opened(what, altered(MACHINE, {"sm.max_blocks": 1}), NOTHING)
+    assert parts.units.chain.tolist() == [40 + 10 * 100] * 3
+    assert play(parts.loads).end == 2 * (40 + 10 * 100)
+    assert parts.terms[Term.LATENCY] == 3 * (40 + 10 * 100) / 2
 
 
 # traffic
