@@ -2,6 +2,7 @@
 
 import reprlib
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -11,12 +12,18 @@ import numpy as np
 
 def plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
     """Numbers of NumPy, and whole floats where an int belongs, as Python's own."""
-    whole = {key for key, kind in get_type_hints(struct).items() if _is_whole(kind)}
+    whole = _whole(struct)
     plain = {key: plain_number(value) for key, value in values.items()}
     return {
         key: int(value) if key in whole and isinstance(value, float) and value.is_integer() else value
         for key, value in plain.items()
     }
+
+
+@cache
+def _whole(struct: type[msgspec.Struct]) -> set[str]:
+    """Keys of a section that are whole numbers."""
+    return {key for key, kind in get_type_hints(struct).items() if _is_whole(kind)}
 
 
 def _is_whole(kind: object) -> bool:
