@@ -72,6 +72,7 @@ def _app(arguments: list[str]) -> "App":
     from cyclopts import App
 
     from tilestamp.experiments.commands.catalogue import catalogue
+    from tilestamp.experiments.commands.compare import compare
     from tilestamp.experiments.commands.measure_machine import measure_machine
     from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
     from tilestamp.experiments.commands.render import PIPELINE, render
@@ -88,7 +89,7 @@ def _app(arguments: list[str]) -> "App":
     )
     draws = arguments[:1] == ["render"]
     app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
-    for command in (study, reproduce, validate, measure_machine):
+    for command in (compare, study, reproduce, validate, measure_machine):
         app.command(command)
     app.command(catalogue, name="list")
     return app

@@ -75,16 +75,19 @@ class Machine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def as_moved(self) -> "Machine":
         """The machine with the number that is moved now; every price is made on this one."""
-        fitted = [Fitted(f"{self.identity.name}: {key}", self._number(key), to) for key, to in self.fitted_to.items()]
+        fitted = [
+            Fitted(f"{self.identity.name}: {key}", float(self.number(key)), to) for key, to in self.fitted_to.items()
+        ]
         values = {number.name.split(": ")[1]: number.value for number in fitted if number.value != number.number}
         return altered(self, values, "fitted", "moved") if values else self
 
-    def _number(self, key: str) -> float:
+    def number(self, key: str) -> Any:
+        """Value by its name in ``provenance``, such as ``"sm.count"``."""
         *path, last = key.split(".")
         part: Any = self
         for step in path:
             part = getattr(part, step)
-        return float(part[last] if isinstance(part, dict) else getattr(part, last))
+        return part[last] if isinstance(part, dict) else getattr(part, last)
 
     @property
     def clock_hz(self) -> float:

@@ -22,6 +22,7 @@ from tilestamp.simulator.manifest import Origin, machine_manifest, mix_manifest,
 from tilestamp.simulator.prices import Machines, Prices, machines_of, prices_of
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
+from tilestamp.simulator.sensitivity import Sensitivity, sensitivity
 from tilestamp.simulator.stage_table import declared, interval_table, stage_table
 from tilestamp.simulator.work import Work
 
@@ -252,6 +253,17 @@ class Run:
         if differences := self.machine.simt.differences(machine.simt, persistent=persistent):
             told = ", ".join(differences)
             raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")
+
+    def sensitivity(self) -> Sensitivity:
+        """What moves the time: every number of the machine, and each thing that costs time, priced anew.
+
+        Raises
+        ------
+        TilestampError
+            A run without times.
+        """
+        self._check_counted()
+        return sensitivity(self.launches, self.machine, self.fidelity, partial(self.prices, skip=True))
 
     def manifest(self) -> dict[str, Any]:
         """All that made the run, as plain data: versions, digests, every option, machine changes, camera, command."""

@@ -1,21 +1,23 @@
 """``tilestamp render``: one picture, and the table of its stages."""
 
 import json
-import os
 import re
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
+from tilestamp.experiments.commands.outputs import check_file, check_png
 from tilestamp.experiments.commands.render_output import as_json, map_path, print_run, write_map, write_png
 from tilestamp.experiments.commands.terminal import progress
+from tilestamp.experiments.commands.trace import draw_timeline, write_schedule
+from tilestamp.experiments.commands.why import print_why, why_json, write_tornado
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.paths import is_folder
 from tilestamp.simulator.pipelines import options_type
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.sensitivity import Sensitivity
 
 PIPELINE = "micropolygon"  # where none is named
 
@@ -37,6 +39,10 @@ def render(
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     option: Annotated[tuple[str, ...], Parameter(name=["--option", "-O"], negative="")] = (),
     set_: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
+    why: Annotated[bool, Parameter(negative="")] = False,
+    tornado: Path | None = None,
+    trace: Path | None = None,
+    timeline: Path | None = None,
     **flags: str | bool | None,
 ) -> None:
     """Draw SCENE and print what each stage did and how long it would take.
@@ -73,9 +79,25 @@ def render(
         An option of the pipeline as NAME=VALUE (`tilestamp list options PIPELINE`); the flags below are the same.
     set_
         Change the machine for a what-if, SECTION.NAME=VALUE (`--set sm.count=60`).
+    why
+        Say what holds each stage and what would help: its time with each thing free, and what each number of the
+        machine does.
+    tornado
+        PNG file for a plot of what each number of the machine does.
+    trace
+        File (.json.gz) for the schedule of all units as a Chrome trace, which Perfetto opens.
+    timeline
+        PNG file for the same as a picture: which SMs are taken over time.
     """
     width, height = parse_size(size)
-    _check_output(output, map_)
+    if output is None and map_ is not None:
+        raise TilestampError("--map writes beside the picture: give -o FILE.png too")
+    for file, flag in ((output, "-o"), (tornado, "--tornado"), (timeline, "--timeline")):
+        check_png(file, flag)
+    if trace is not None:
+        check_file(trace, "--trace", ".json.gz")
+    if (why or tornado or trace or timeline) and (fidelity == "counts" or not counting):
+        raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
     options = given_options(options_type(pipeline), flags, option)
@@ -86,14 +108,42 @@ def render(
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
             _ = run.stages
+        explained = _explained(run, why, tornado, trace, timeline)
     if map_ is not None and output is not None:
         write_map(run, map_, map_path(output, map_))
     if output is not None:
         write_png(run.image, output)
     if json_:
-        sys.stdout.write(json.dumps(as_json(run)) + "\n")
-    else:
-        print_run(run, output, map_)
+        sys.stdout.write(
+            json.dumps(as_json(run) | ({"why": why_json(explained.found)} if explained.found else {})) + "\n"
+        )
+        return
+    print_run(run, output, map_)
+    sys.stdout.writelines(f"{line}\n" for line in explained.lines)
+    if explained.found is not None and why:
+        print_why(run, explained.found)
+
+
+class _Explained(NamedTuple):
+    """What moves a run, where that was asked for, and a line for each file that was written."""
+
+    found: Sensitivity | None
+    lines: list[str]
+
+
+def _explained(run: Run, why: bool, tornado: Path | None, trace: Path | None, timeline: Path | None) -> _Explained:
+    """Write all that explains a run."""
+    found = run.sensitivity() if why or tornado is not None else None
+    lines = []
+    if found is not None and tornado is not None:
+        write_tornado(run, found, tornado)
+        lines.append(f"tornado: {tornado}")
+    if trace is not None:
+        lines.append(write_schedule(run, trace))
+    if timeline is not None:
+        draw_timeline(run, timeline)
+        lines.append(f"timeline: {timeline}")
+    return _Explained(found, lines)
 
 
 def _simulate(
@@ -122,19 +172,3 @@ def parse_size(size: str) -> tuple[int, int]:
     if match is None:
         raise TilestampError(f"--size is WIDTHxHEIGHT in pixels, such as 1600x1200, not {size}")
     return int(match[1]), int(match[2])
-
-
-def _check_output(output: Path | None, map_: str | None) -> None:
-    """Refuse an output that could not be written, before anything is computed."""
-    if output is None:
-        if map_ is not None:
-            raise TilestampError("--map writes beside the picture: give -o FILE.png too")
-        return
-    if output.suffix.lower() != ".png":
-        raise TilestampError(f"-o {output}: pictures are written as .png")
-    if not is_folder(output.parent):
-        raise TilestampError(f"-o {output}: there is no folder {output.parent}")
-    if is_folder(output):
-        raise TilestampError(f"-o {output}: is a folder")
-    if not os.access(output.parent, os.W_OK):
-        raise TilestampError(f"-o {output}: the folder {output.parent} cannot be written to")

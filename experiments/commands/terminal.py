@@ -19,12 +19,12 @@ GAP = 2  # blanks between two columns
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path, flag: str = "-o") -> Iterator[None]:
     """Say in a sentence why a file cannot be written."""
     try:
         yield
     except OSError as error:
-        raise TilestampError(f"-o {path}: cannot be written ({error.strerror or error})") from error
+        raise TilestampError(f"{flag} {path}: cannot be written ({error.strerror or error})") from error
 
 
 @contextmanager

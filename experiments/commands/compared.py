@@ -1,0 +1,153 @@
+"""Runs beside each other: read back, printed, drawn."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from tilestamp.experiments.commands.terminal import print_table, writing
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.run import Run
+
+FRAME = "frame"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is compared of a run.
+
+    Parameters
+    ----------
+    name : str
+        What makes it another than those beside it.
+    scene, about : str
+        What is drawn, and all that it is.
+    times : dict of str to float
+        Milliseconds by stage, ``frame`` last: the sum.
+    bounds : dict of str to str
+        What holds the longest launch of each stage.
+    terms : dict of str to dict
+        Milliseconds of each term of the time, by stage.
+    """
+
+    name: str
+    scene: str
+    about: str
+    times: dict[str, float]
+    bounds: dict[str, str]
+    terms: dict[str, dict[str, float]]
+
+    def plain(self) -> dict[str, Any]:
+        """All of it as plain data."""
+        return asdict(self)
+
+
+def from_run(run: Run, name: str) -> Compared:
+    """What is compared of a run that is here."""
+    stages: dict[str, dict[str, Any]] = run.stages.astype(object).to_dict(orient="index")
+    return _compared(
+        name, run.scene, f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}", stages
+    )
+
+
+def saved(path: Path) -> Compared:
+    """Read what is compared of a run that ``tilestamp render --json`` printed.
+
+    Raises
+    ------
+    TilestampError
+        No such file, or one that holds no run with times.
+    """
+    try:
+        run = json.loads(path.read_text("utf-8"))
+        about = f"{run['scene']} by {run['pipeline']} on {run['machine']}, {run['width']}x{run['height']}"
+        return _compared(path.stem, run["scene"], about, run["stages"])
+    except OSError as error:
+        raise TilestampError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise TilestampError(f"{path} holds no run with times, as tilestamp render --json prints one") from error
+
+
+def _compared(name: str, scene: str, about: str, stages: dict[str, dict[str, Any]]) -> Compared:
+    times = {stage: float(row["milliseconds"]) for stage, row in stages.items()}
+    bounds = {stage: str(row["bound"]) for stage, row in stages.items()}
+    terms = {
+        stage: {
+            key.removesuffix("_ms"): float(value)
+            for key, value in row.items()
+            if key.endswith("_ms") and value is not None and value == value  # noqa: PLR0124 - not-a-number
+        }
+        for stage, row in stages.items()
+    }
+    return Compared(name, scene, about, times | {FRAME: sum(times.values())}, bounds, terms)
+
+
+def print_comparison(runs: Sequence[Compared]) -> None:
+    """Print times, shares and ratios, then what holds each stage and the term that changed most."""
+    sys.stdout.writelines(f"{run.name}: {run.about}\n" for run in runs)
+    first, *others = runs
+    stages = [*dict.fromkeys(stage for run in runs for stage in run.times if stage != FRAME), FRAME]
+    columns = ["stage"]
+    for index, run in enumerate(runs):
+        columns += [f"{run.name} ms", "share", *(["ratio"] if index else [])]
+    rows = [[stage, *(text for run in runs for text in _cells(stage, run, first))] for stage in stages]
+    sys.stdout.write("\n")
+    print_table(f"Milliseconds; ratio: to {first.name}", columns, rows)
+    rows = [_change(stage, first, run) for stage in stages[:-1] for run in others if _differs(stage, first, run)]
+    if rows:
+        sys.stdout.write("\n")
+        columns = ["stage", "run", "held by", "then", "term", "ms", "then ms", "ratio"]
+        print_table(
+            "What holds, and how that term changed; where none holds, the largest change",
+            columns,
+            rows,
+            keys=2,
+        )
+
+
+def _cells(stage: str, run: Compared, first: Compared) -> list[str]:
+    """Time and share of a stage, and the ratio to that of another run."""
+    if stage not in run.times:
+        return ["", "", *([""] if run is not first else [])]
+    time, whole = run.times[stage], run.times[FRAME]
+    cells = [f"{time:.4g}", f"{100 * time / whole:.1f} %" if whole else ""]
+    if run is first:
+        return cells
+    return [*cells, f"{time / first.times[stage]:.4g}" if first.times.get(stage) else ""]
+
+
+def _differs(stage: str, first: Compared, run: Compared) -> bool:
+    """Whether two runs have a stage, with other times."""
+    return stage in run.times and stage in first.times and run.times[stage] != first.times[stage]
+
+
+def _change(stage: str, first: Compared, run: Compared) -> list[str]:
+    """What holds a stage in two runs, and how that term changed; where no term holds, the one that changed most."""
+    before, after = first.terms[stage], run.terms[stage]
+    row = [stage, run.name, first.bounds[stage], run.bounds[stage]]
+    both = before.keys() & after.keys()
+    if not both:
+        return [*row, "", "", "", ""]
+    held = [name for name in (first.bounds[stage], run.bounds[stage]) if name in both]
+    term = held[0] if held else max(sorted(both), key=lambda name: abs(after[name] - before[name]))
+    ratio = f"{after[term] / before[term]:.4g}" if before[term] else ""
+    return [*row, term, f"{before[term]:.4g}", f"{after[term]:.4g}", ratio]
+
+
+def write_plot(runs: Sequence[Compared], path: Path) -> None:
+    """Draw the times of the stages, a bar a run, with what holds at its end."""
+    import pandas as pd
+
+    from tilestamp.reports.compare_plot import grouped_bars
+
+    rows = [
+        {"stage": stage, "run": run.name, "milliseconds": time, "bound": run.bounds.get(stage, "")}
+        for run in runs
+        for stage, time in run.times.items()
+    ]
+    title = f"{', '.join(dict.fromkeys(run.scene for run in runs))}: milliseconds, and what holds"
+    columns = {"group": "stage", "bar": "run", "value": "milliseconds", "note": "bound"}
+    with writing(path):
+        grouped_bars(pd.DataFrame(rows), path, **columns, title=title, label="milliseconds")

@@ -1,0 +1,25 @@
+"""Files that a command is to write: refused before anything is computed, where they could not be."""
+
+import os
+from pathlib import Path
+
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.paths import is_folder
+
+
+def check_png(output: Path | None, flag: str = "-o") -> None:
+    """Refuse a picture that could not be written."""
+    if output is not None:
+        check_file(output, flag, ".png")
+
+
+def check_file(output: Path, flag: str, ending: str) -> None:
+    """Refuse a file that could not be written."""
+    if not output.name.lower().endswith(ending):
+        raise TilestampError(f"{flag} {output}: is written as {ending}")
+    if not is_folder(output.parent):
+        raise TilestampError(f"{flag} {output}: there is no folder {output.parent}")
+    if is_folder(output):
+        raise TilestampError(f"{flag} {output}: is a folder")
+    if not os.access(output.parent, os.W_OK):
+        raise TilestampError(f"{flag} {output}: the folder {output.parent} cannot be written to")

@@ -1,0 +1,126 @@
+"""Free: the time of a launch if one thing cost nothing, priced anew and not subtracted.
+
+Most things are costs of the machine, so a machine on which they are 0 (or a rate without end) answers. Two are not:
+
+balance  SMs idle because there are fewer units than SMs. Free of it, each unit is cut into as many as keep all SMs
+         busy: its work and its chain, a share on each SM.
+tail     the last units run on while other places are empty. Free of it, all places end together.
+
+Both are the schedule's; a roofline knows no tail.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from tilestamp.models.bounds import COLUMNS, HOLDS, Result, Term, bound_machine
+from tilestamp.models.launch import Launch, PipeLaunch
+from tilestamp.models.loaded import Loaded, loaded
+from tilestamp.models.machine import Machine
+from tilestamp.models.numbers import Number
+from tilestamp.models.schedule import Loads, crowd, play, schedule_machine
+from tilestamp.models.timing import Timing
+from tilestamp.models.traffic import traffic
+
+MACHINE_TERMS = ("issue", "shared", "l1", "latency", "dram", "l2", "atomics", "start", "launch")
+SCHEDULE_TERMS = ("balance", "tail")
+_Numbers = dict[str, dict[str, tuple[str, ...]]]  # by term and section
+_RATES: _Numbers = {
+    "l1": {"memory": ("l1_bytes_per_clock", "l1_write_bytes_per_clock", "l1_local_bytes_per_clock")},
+    "dram": {"memory": ("dram_gb_per_s",)},
+    "l2": {"memory": ("l2_bytes_per_clock", "l2_write_bytes_per_clock")},
+    "atomics": {
+        "atomics": ("requests_per_clock", "unawaited_per_clock", "sm_requests_per_clock", "sm_unawaited_per_clock")
+    },
+    "start": {"launch": ("blocks_per_us",)},
+}
+_COSTS: _Numbers = {
+    "issue": {"issue": (), "pipe": ()},  # all of the section
+    "shared": {"memory": ("bank_pass_cycles",)},
+    "latency": {"latency": ()},
+    "atomics": {"atomics": ("unit_ns_per_request", "conflict_ns")},
+    "launch": {"launch": ("kernel_us",)},
+}
+
+
+def free_terms(machine: Machine) -> tuple[str, ...]:
+    """All that can be free on a machine: terms of its price, balance and tail, units of its fixed-function pipe."""
+    units = machine.fixed_function.per_clock if machine.fixed_function else ()
+    return (*MACHINE_TERMS, *SCHEDULE_TERMS, *units)
+
+
+def free_of(machine: Machine, term: str) -> Machine:
+    """Return the machine on which ``term`` (no ``SCHEDULE_TERMS``) costs nothing: no machine file can say that."""
+    changed: dict[str, Any] = {}
+    for table, value in ((_RATES, math.inf), (_COSTS, 0.0)):
+        for section, names in table.get(term, {}).items():
+            part = changed.get(section, getattr(machine, section))
+            changed[section] = structs.replace(part, **dict.fromkeys(names or part.__struct_fields__, value))
+    pipe = machine.fixed_function
+    if pipe is not None and term in pipe.per_clock:
+        changed["fixed_function"] = structs.replace(pipe, per_clock=pipe.per_clock | {term: math.inf})
+    return structs.replace(machine, **changed, changes=machine.changes | {term: ("", "free")})
+
+
+def without(
+    launches: Sequence[Launch | PipeLaunch], machine: Machine, timings: Sequence[Timing], term: str
+) -> list[Timing]:
+    """Price launches without ``balance`` or ``tail``, each at the fidelity that its timing has.
+
+    Parameters
+    ----------
+    launches, timings : sequences of equal length
+        Those of a frame, and what ``models.price`` made of them.
+    machine : Machine
+    term : {"balance", "tail"}
+    """
+    moved = traffic(launches, machine)
+    return [
+        _without(loaded(launch, machine, bytes_), timing, term) if isinstance(launch, Launch) else timing
+        for launch, bytes_, timing in zip(launches, moved, timings, strict=True)
+    ]
+
+
+def _without(whole: Loaded, timing: Timing, term: str) -> Timing:
+    busy = min(whole.shape.units, whole.loads.sms)
+    share = busy / whole.machine[Number.SM_COUNT] if term == "balance" else 1.0
+    units, terms, machine = whole.loads, whole.terms.copy(), whole.machine.copy()
+    if term == "balance":
+        terms[Term.BALANCE], terms[Term.LATENCY] = 0.0, terms[Term.LATENCY] * share
+        units = units._replace(sm=units.sm * share, alone=units.alone * share)
+        machine[Number.SM_COUNT] = busy  # of which none is idle
+    row, way = np.zeros(COLUMNS), whole.way * share
+    if timing.fidelity == "schedule":
+        played = play(units) if term == "balance" else play(units)._replace(end=level(units))
+        schedule_machine(whole.shape, played, terms, way, machine, whole.facts, row)
+    else:
+        bound_machine(terms, way, row)
+    cycles = float(row[Result.CYCLES])
+    milliseconds = cycles / timing.cycles * timing.milliseconds
+    return replace(timing, cycles=cycles, milliseconds=milliseconds, bound=HOLDS[int(row[Result.BOUND])])
+
+
+def level(units: Loads) -> float:
+    """Cycles to the end of units of which none runs on alone: never above what ``models.schedule.play`` expects.
+
+    As they share SMs with their neighbours, or one an SM, whichever is sooner.
+    """
+    if not len(units.alone):
+        return 0.0
+    return min(_level(units, units.alone + crowd(units), units.places), _level(units, units.alone, units.sms))
+
+
+def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:
+    """All places, SMs and draws busy from the first unit to the end, blocks started at their rate."""
+    count = len(alone)
+    return max(
+        float(alone.sum()) / min(places, count),
+        units.start + float(units.sm.sum()) / min(units.sms, count),
+        float(units.draws.sum()) + float(alone.min()),
+        units.interval * (count - 1) + float(alone.min()),
+    )
