@@ -68,13 +68,6 @@ class Batch:
         TilestampError
             A block that a machine cannot launch.
         """
-        facts = self.facts(launch, moved)
-        prices = np.empty((len(self.machines), COLUMNS))
-        prices[self._order] = launch_prices(launch, self.numbers[self._order], facts[self._order], scheduled=scheduled)
-        return prices
-
-    def facts(self, launch: Launch, moved: Sequence[Traffic]) -> NDArray[np.float64]:
-        """Facts of one launch, (machines, len(Fact)); parameters and errors as of ``prices``."""
         facts = np.empty((len(self.machines), len(Fact)))
         held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
         facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])

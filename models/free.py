@@ -18,12 +18,12 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, HOLDS, Result, Term, bound_machine
+from tilestamp.models.bounds import COLUMNS, HOLDS, Result, Term, bound_launch, longest
 from tilestamp.models.launch import Launch, PipeLaunch
-from tilestamp.models.loaded import Loaded, loaded
+from tilestamp.models.launch_prices import Opened
 from tilestamp.models.machine import Machine
-from tilestamp.models.numbers import Number
-from tilestamp.models.schedule import Loads, crowd, play, schedule_machine
+from tilestamp.models.price import opened
+from tilestamp.models.schedule import IN_THE_WAY, Loads, crowd, holds, play, schedule_launch, together
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import traffic
 
@@ -79,30 +79,40 @@ def without(
     machine : Machine
     term : {"balance", "tail"}
     """
-    moved = traffic(launches, machine)
+    without_it = _balanced if term == "balance" else _level_ends
     return [
-        _without(loaded(launch, machine, bytes_), timing, term) if isinstance(launch, Launch) else timing
-        for launch, bytes_, timing in zip(launches, moved, timings, strict=True)
+        without_it(opened(launch, machine, moved), timing, machine.sm.count) if isinstance(launch, Launch) else timing
+        for launch, moved, timing in zip(launches, traffic(launches, machine), timings, strict=True)
     ]
 
 
-def _without(whole: Loaded, timing: Timing, term: str) -> Timing:
-    busy = min(whole.shape.units, whole.loads.sms)
-    share = busy / whole.machine[Number.SM_COUNT] if term == "balance" else 1.0
-    units, terms, machine = whole.loads, whole.terms.copy(), whole.machine.copy()
-    if term == "balance":
-        terms[Term.BALANCE], terms[Term.LATENCY] = 0.0, terms[Term.LATENCY] * share
-        units = units._replace(sm=units.sm * share, alone=units.alone * share)
-        machine[Number.SM_COUNT] = busy  # of which none is idle
-    row, way = np.zeros(COLUMNS), whole.way * share
+def _balanced(whole: Opened, timing: Timing, sms: int) -> Timing:
+    """Price units that are cut into as many as keep all SMs busy."""
+    units, terms, row = whole.loads, whole.terms.copy(), np.zeros(COLUMNS)
+    share = min(len(units.alone), units.sms) / sms
+    terms[Term.BALANCE], terms[Term.LATENCY] = 0.0, terms[Term.LATENCY] * share
+    units = units._replace(sm=units.sm * share, alone=units.alone * share, way=units.way * share)
     if timing.fidelity == "schedule":
-        played = play(units) if term == "balance" else play(units)._replace(end=level(units))
-        schedule_machine(whole.shape, played, terms, way, machine, whole.facts, row)
+        schedule_launch(units, terms, False, row)
     else:
-        bound_machine(terms, way, row)
-    cycles = float(row[Result.CYCLES])
-    milliseconds = cycles / timing.cycles * timing.milliseconds
-    return replace(timing, cycles=cycles, milliseconds=milliseconds, bound=HOLDS[int(row[Result.BOUND])])
+        bound_launch(terms, units.way, row)
+    return _timed(timing, float(row[Result.CYCLES]), int(row[Result.BOUND]))
+
+
+def _level_ends(whole: Opened, timing: Timing, sms: int) -> Timing:
+    """Price units of which none runs on alone."""
+    if timing.fidelity != "schedule":
+        return timing
+    units, terms, end = whole.loads, whole.terms, level(whole.loads)
+    beside = together(units, play(units), units.begun + end, IN_THE_WAY)
+    cycles = max(longest(terms, units.way), beside)
+    return _timed(timing, float(terms[Term.LAUNCH]) + cycles, holds(terms, cycles, 0.0, units.sms < sms))
+
+
+def _timed(timing: Timing, cycles: float, bound: int) -> Timing:
+    """The timing of a launch that takes ``cycles``."""
+    milliseconds = timing.milliseconds * cycles / timing.cycles if timing.cycles else 0.0
+    return replace(timing, cycles=cycles, milliseconds=milliseconds, bound=HOLDS[bound])
 
 
 def level(units: Loads) -> float:
@@ -112,7 +122,7 @@ def level(units: Loads) -> float:
     """
     if not len(units.alone):
         return 0.0
-    return min(_level(units, units.alone + crowd(units), units.places), _level(units, units.alone, units.sms))
+    return min(_level(units, crowd(units)[0], units.places), _level(units, units.alone, units.sms))
 
 
 def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from tilestamp.models.bounds import Term
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch
+from tilestamp.models.launch_prices import Opened
 from tilestamp.models.list_schedule import replay, tournament
-from tilestamp.models.loaded import Loaded, loaded
 from tilestamp.models.machine import Machine
-from tilestamp.models.price import price
+from tilestamp.models.price import opened, price
 from tilestamp.models.schedule import Loads, crowd
 from tilestamp.models.traffic import Traffic
 
@@ -62,8 +62,8 @@ def spans(launch: Launch, machine: Machine, moved: Traffic) -> Spans:
     TilestampError
         A block that the machine cannot launch.
     """
-    whole = loaded(launch, machine, moved)
-    begin = float(whole.terms[Term.LAUNCH]) + whole.begun
+    whole = opened(launch, machine, moved)
+    begin = float(whole.terms[Term.LAUNCH]) + whole.loads.begun
     start, end, place, places = _sooner(whole.loads)
     return Spans(
         start=begin + start,
@@ -82,7 +82,7 @@ def spans(launch: Launch, machine: Machine, moved: Traffic) -> Spans:
 def _sooner(units: Loads) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], int]:
     """Starts, ends, places and their number, as neighbours on the SMs or one an SM: whichever ends sooner."""
     choices = []
-    for alone, places in ((units.alone + crowd(units), units.places), (units.alone, units.sms)):
+    for alone, places in ((crowd(units)[0], units.places), (units.alone, units.sms)):
         out = np.zeros(len(alone)), np.zeros(len(alone)), np.zeros(len(alone), np.int64)
         _record(units.sm, alone, units.draws, places, units.sms, units.interval, units.start, *out)
         choices.append((*out, places))
@@ -125,9 +125,9 @@ def _record(
             replay(free, free_who, ends[i])
 
 
-def _holds(whole: Loaded) -> NDArray[np.int64]:
+def _holds(whole: Opened) -> NDArray[np.int64]:
     """What takes longest of each unit's own costs."""
-    units, draws = whole.demand, whole.loads.draws
+    units, draws = whole.units, whole.loads.draws
     costs = [units.chain, units.issue, units.shared, units.l1, draws if len(draws) else np.zeros(len(units.chain))]
     largest: NDArray[np.int64] = np.argmax(costs, axis=0)
     return largest

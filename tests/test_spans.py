@@ -12,7 +12,7 @@ from tests.pricing import schedule
 from tests.test_schedule import GTX280, H200, NOTHING, launch
 from tests.test_time_properties import MACHINES, launches
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.loaded import loaded
+from tilestamp.models.price import opened
 from tilestamp.models.schedule import crowd, play
 from tilestamp.models.spans import OWN, spans
 from tilestamp.models.traffic import traffic
@@ -41,10 +41,10 @@ def naive(units, alone, places):
 def test_starts_and_ends_are_those_of_a_plain_list_scheduler(what, machine):
     moved = traffic([what], machine)[0]
     try:
-        got, units = spans(what, machine, moved), loaded(what, machine, moved).loads
+        got, units = spans(what, machine, moved), opened(what, machine, moved).loads
     except TilestampError:
         return
-    choices = [naive(units, units.alone + crowd(units), units.places), naive(units, units.alone, units.sms)]
+    choices = [naive(units, crowd(units)[0], units.places), naive(units, units.alone, units.sms)]
     expected = min(choices, key=lambda choice: max(end for _, end in choice))
     begun = got.units_begin
     assert np.allclose(np.transpose([got.start, got.end]) - begun, expected, rtol=1e-9, atol=1e-3)
@@ -58,7 +58,7 @@ def test_the_last_unit_ends_when_the_schedule_says_and_never_after_the_launch(wh
         got = spans(what, machine, moved)
     except TilestampError:
         return
-    expected = play(loaded(what, machine, moved).loads).end
+    expected = play(opened(what, machine, moved).loads).end
     assert got.units_end - got.units_begin == pytest.approx(expected)
     assert got.end.max() == pytest.approx(got.units_end)
     assert got.total == schedule(what, machine, moved).cycles
