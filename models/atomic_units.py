@@ -29,16 +29,16 @@ def dealing_of(machine: Machine) -> Dealing:
     return Dealing(machine.atomics.unit_bytes, machine.atomics.units)
 
 
-def fullest_requests(requests: NDArray[np.int64] | None, dealing: Dealing) -> float:
+def fullest_requests(requests: NDArray[np.int64], dealing: Dealing) -> float:
     """Requests at the atomic unit that gets most.
 
     Parameters
     ----------
-    requests : ndarray, (chunks,), int64, or None
+    requests : ndarray, (chunks,), int64
         By chunk of ``CHUNK_BYTES``.
     dealing : Dealing
     """
-    if requests is None or not requests.any():
+    if not requests.any():
         return 0.0
     unit = np.arange(len(requests)) * CHUNK_BYTES // dealing.unit_bytes
     return float(np.bincount(unit % dealing.units if dealing.units else unit, weights=requests).max())

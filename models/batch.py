@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.atomic_units import dealing_of, fullest_requests
-from tilestamp.models.bounds import COLUMNS, Fact
+from tilestamp.models.bounds import Fact
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import launch_prices
 from tilestamp.models.machine import Machine
@@ -25,17 +25,23 @@ T = TypeVar("T")
 
 
 class Batch:
-    """Machines side by side.
+    """Machines, those that share work side by side.
 
     Parameters
     ----------
     machines : sequence of Machine
+
+    Attributes
+    ----------
+    order : ndarray, (machines,)
+        Place among those given of each of its machines.
     """
 
     def __init__(self, machines: Sequence[Machine]) -> None:
+        numbers = numbers_of(machines)
+        self.order = np.lexsort(numbers.T[::-1])
+        self.numbers, machines = numbers[self.order], [machines[place] for place in self.order]
         self.machines = machines
-        self.numbers = numbers_of(machines)
-        self._order = np.lexsort(self.numbers.T[::-1])  # machines that share work side by side
         self._holding, self._caches, self._dealing = (_Shared(machines, k) for k in (holding_of, caches_of, dealing_of))
 
     @property
@@ -50,9 +56,7 @@ class Batch:
 
     def prices(self, launch: Launch, moved: Sequence[Traffic], *, scheduled: bool) -> NDArray[np.float64]:
         """Price one launch, (machines, COLUMNS); see ``launch_prices`` and ``facts``."""
-        facts, prices = self.facts(launch, moved), np.empty((len(self.machines), COLUMNS))
-        prices[self._order] = launch_prices(launch, self.numbers[self._order], facts[self._order], scheduled=scheduled)
-        return prices
+        return launch_prices(launch, self.numbers, self.facts(launch, moved), scheduled=scheduled)
 
     def facts(self, launch: Launch, moved: Sequence[Traffic]) -> NDArray[np.float64]:
         """Facts of one launch, (machines, len(Fact)).
@@ -72,8 +76,10 @@ class Batch:
         held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
         facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
         facts[:, Fact.DRAM_BYTES : Fact.WRITTEN_BYTES + 1] = moved
-        fullest = [fullest_requests(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
-        facts[:, Fact.FULLEST_REQUESTS] = self._dealing.each(fullest)
+        facts[:, Fact.FULLEST_REQUESTS] = 0.0
+        if launch.atomic_requests is not None:
+            fullest = [fullest_requests(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
+            facts[:, Fact.FULLEST_REQUESTS] = self._dealing.each(fullest)
         return facts
 
 

@@ -48,7 +48,8 @@ class Term(IntEnum):
 
 
 TAIL = Term.LAUNCH + 1  # what holds a schedule where no term does: the last units
-HOLDS = (*(term.name.lower() for term in Term), "tail")
+TERMS = tuple(term.name.lower() for term in Term)
+HOLDS = (*TERMS, "tail")
 
 
 class Result(IntEnum):

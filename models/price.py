@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.batch import Batch
-from tilestamp.models.bounds import HOLDS, Result, Term
+from tilestamp.models.bounds import HOLDS, TERMS, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fixed_function import check_pipe, pipe_time
 from tilestamp.models.launch import Launch, PipeLaunch
@@ -23,7 +23,7 @@ from tilestamp.models.used import note
 
 Fidelity = Literal["counts", "bounds", "schedule"]
 FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "schedule")
-ENDS = [Result.CYCLES, Result.LOW, Result.HIGH]
+ENDS = [int(end) for end in (Result.CYCLES, Result.LOW, Result.HIGH)]
 NAN = float("nan")
 
 
@@ -90,12 +90,13 @@ def prices(
         if isinstance(launch, Launch):
             rows = batch.prices(launch, moved, scheduled=fidelity == "schedule")
             found = rows[:, ENDS].T / batch.clock_hz * 1e3
-            times.bounds[:, place] = np.array(HOLDS)[rows[:, Result.BOUND].astype(np.intp)]
+            times.bounds[batch.order, place] = np.array(HOLDS)[rows[:, Result.BOUND].astype(np.intp)]
         else:
             passes = [pipe_time(launch, machine, bytes_) for machine, bytes_ in zip(batch.machines, moved, strict=True)]
             found = np.array([(each.milliseconds, each.low, each.high) for each in passes]).reshape(-1, 3).T
-            times.bounds[:, place] = [each.bound for each in passes]
-        times.milliseconds[:, place], times.low[:, place], times.high[:, place] = found
+            times.bounds[batch.order, place] = [each.bound for each in passes]
+        for into, values in zip(times[:3], found, strict=True):
+            into[batch.order, place] = values
     return times
 
 
@@ -151,23 +152,24 @@ def _timing(launch: Launch | PipeLaunch, batch: Batch, moved: Sequence[Traffic],
         return _untimed(launch, bytes_, held.occupancy)
     row = batch.prices(launch, moved, scheduled=fidelity == "schedule")[0].tolist()
     cycles, low, high = (row[place] for place in ENDS)
+    clock_hz = machine.clock_hz
     details = {"resident_blocks": float(held.blocks)}
     if fidelity == "schedule":
         details |= {"busy_sms": row[Result.BUSY_SMS], "tail_cycles": row[Result.TAIL_CYCLES]}
     return Timing(
         stage=launch.stage,
         kernel=launch.kernel,
-        term_cycles={HOLDS[term]: row[term] for term in Term},
+        term_cycles=dict(zip(TERMS, row, strict=False)),
         cycles=cycles,
-        milliseconds=cycles / machine.clock_hz * 1e3,
+        milliseconds=cycles / clock_hz * 1e3,
         bound=HOLDS[int(row[Result.BOUND])],
         occupancy=held.occupancy,
         dram_bytes=bytes_.dram_bytes,
         l2_bytes=bytes_.l2_bytes,
         details=details,
         fidelity=fidelity,
-        low=low / machine.clock_hz * 1e3,
-        high=high / machine.clock_hz * 1e3,
+        low=low / clock_hz * 1e3,
+        high=high / clock_hz * 1e3,
         residency=_steps(launch, machine, held),
     )
 
