@@ -28,11 +28,11 @@ from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.machine import Machine
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.numbers import numbers_of
+from tilestamp.models.sums import TOGETHER, sum_up
 
 Cycles = NDArray[np.float64]
 CLASSES = len(INSTRUCTION_CLASSES)
 SUMS = 11  # rows of the matrix of rates
-TOGETHER = 512  # units whose events stay in the cache of this computer while they are summed up
 
 
 class Sum(IntEnum):
@@ -207,7 +207,7 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
     way = np.inf if units else 0.0
     for first in range(0, units, TOGETHER):
         last = min(units, first + TOGETHER)
-        _sum_up(events, first, last, matrix, sums)
+        sum_up(matrix[: Sum.OTHERS], events, first, last, sums, 0)
         for i in range(last - first):
             row, unit = sums[:, i], first + i
             pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
@@ -220,18 +220,3 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
             issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
             way = min(way, chain)
     return Whole(issues, shareds, l1s, chains, way)
-
-
-@kernel
-def _sum_up(events: Any, first: int, last: int, matrix: Any, sums: Any) -> None:
-    """Product of a matrix that is mostly empty and of events that are a column each, for some units."""
-    units = last - first
-    for row in range(Sum.OTHERS):
-        into = sums[row]
-        into[:units] = 0.0
-        for column in range(EVENTS):
-            rate = matrix[row, column]
-            if rate:
-                counts = events[column, first:last]
-                for i in range(units):
-                    into[i] += rate * counts[i]

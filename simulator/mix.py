@@ -35,7 +35,9 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.fitted import Fitted
+from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch
+from tilestamp.models.sums import TOGETHER, sum_up
 from tilestamp.models.used import note
 from tilestamp.simulator.work import Work
 
@@ -140,11 +142,30 @@ class Mix:
             block=work.block,
             registers=kernel.registers,
             shared_bytes=work.shared_bytes + kernel.shared_bytes,
-            events=(kernel.matrix(work.events, warp).T @ work.table.T.astype(np.float64)).T,  # by column, as it is read
+            events=_machine_events(kernel.matrix(work.events, warp), work.table),
             dispatch=work.dispatch,
             streams=work.streams,
             atomic_requests=work.atomic_requests,
         )
+
+
+def _machine_events(matrix: NDArray[np.float64], table: NDArray[np.generic]) -> NDArray[np.float64]:
+    """Product of a work table and a mix, by column, as it is read."""
+    events = np.empty((EVENTS, len(table)))
+    _add_up(np.ascontiguousarray(matrix.T), table, events)
+    return events.T
+
+
+@kernel
+def _add_up(matrix: Any, table: Any, events: Any) -> None:
+    columns, units = table.shape[1], len(table)
+    block = np.empty((columns, TOGETHER))
+    for first in range(0, units, TOGETHER):
+        count = min(TOGETHER, units - first)
+        for i in range(count):
+            for column in range(columns):
+                block[column, i] = table[first + i, column]
+        sum_up(matrix, block, 0, count, events, first)
 
 
 @cache

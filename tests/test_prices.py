@@ -1,10 +1,15 @@
 """Prices of one run on many machines: each is that of one machine, and what no machine can price is said."""
 
+import re
+from contextlib import suppress
+from functools import reduce
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from tilestamp import TilestampError, altered, load_machine, simulate, variants
+from tilestamp.simulator.pipelines import pipeline_names
 
 SMALL = {"width": 96, "height": 72}
 NUMBERS = {"sm.clock_mhz": [900.0, 1500.0, 1500.0], "memory.dram_gb_per_s": [100.0, 100.0, 200.0]}
@@ -62,3 +67,42 @@ def test_a_machine_without_a_price_is_refused_or_skipped(run):
     assert "simulate again on it" in got.refusals[1]
     assert np.isnan(got.frame[:2]).all()
     assert got.frame[2] == pytest.approx(run.milliseconds)
+
+
+PIPELINES = [(name, machine) for name in pipeline_names() for machine in ("gtx280", "gtx680", "h200")]
+
+
+@pytest.fixture(scope="module", params=PIPELINES, ids=" ".join)
+def changed(request):
+    """A small frame, and its machine with each of its numbers changed by itself, some twice."""
+    name, machine = request.param
+    try:
+        run = simulate("teapot", name, machine, **SMALL)
+    except TilestampError as refused:
+        pytest.skip(str(refused))
+    return run, [other for key in run.machine.provenance for other in _others(run.machine, key)]
+
+
+def _others(machine, key):
+    """The machine with one number larger and one smaller, where a machine can have such."""
+    value = reduce(
+        lambda part, step: part[step] if isinstance(part, dict) else getattr(part, step), key.split("."), machine
+    )
+    for ratio in (0.5, 2.0):
+        with suppress(TilestampError):
+            if isinstance(value, int | float):
+                yield altered(machine, {key: type(value)(value * ratio)})
+
+
+def test_whatever_number_changes_many_machines_are_priced_as_each_alone(changed):
+    """Shared work is of no other machine: in this order each machine comes between two that differ from it."""
+    run, machines = changed
+    got = run.prices([*machines, *reversed(machines)], skip=True)
+    for place, machine in enumerate(machines):
+        twin = 2 * len(machines) - 1 - place
+        if place in got.refusals:
+            with pytest.raises(TilestampError, match=re.escape(got.refusals[place])):
+                run.on(machine).timings  # noqa: B018 - raises
+            continue
+        alone = [timing.milliseconds for timing in run.on(machine).timings]
+        assert got.milliseconds[place].tolist() == alone == got.milliseconds[twin].tolist(), machine.name
