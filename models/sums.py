@@ -4,9 +4,7 @@ from typing import Any
 
 from tilestamp.models.kernel import kernel
 
-TOGETHER = (
-    500  # units whose counts stay in the cache of this computer while they are summed up: no power of 2, which collide
-)
+TOGETHER = 500  # units whose counts stay in the cache of this computer; no power of 2, whose rows would collide there
 
 
 @kernel

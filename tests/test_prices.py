@@ -2,6 +2,7 @@
 
 import re
 from contextlib import suppress
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -30,6 +31,13 @@ def test_prices_are_those_of_one_machine_at_a_time(run):
         assert got.bounds[place].tolist() == [timing.bound for timing in timings]
         assert got.frame[place] == pytest.approx(run.on(machine).milliseconds, rel=1e-14)
     assert got.kernels == tuple(timing.kernel for timing in run.timings)
+
+
+def test_a_machine_of_another_mix_is_priced_by_that(run):
+    """Instructions of the back end are those of 9.0 on an H200, and older ones on an A100."""
+    fresh = replace(run, frame=replace(run.frame)).on("a100")
+    assert fresh.launches[-1].events.sum() != run.launches[-1].events.sum()
+    assert run.prices(["h200", "a100"]).milliseconds[1].tolist() == [timing.milliseconds for timing in fresh.timings]
 
 
 @pytest.mark.parametrize("numbers", [NUMBERS, pd.DataFrame(NUMBERS)])
