@@ -20,11 +20,7 @@ def run(request):
 def machines(run, count):
     """Machines of three random numbers."""
     random = np.random.default_rng(1)
-    numbers = {
-        "sm.clock_mhz": (800.0, 2000.0),
-        "memory.dram_gb_per_s": (80.0, 500.0),
-        "latency.dram_cycles": (300.0, 800.0),
-    }
+    ends = {"sm.clock_mhz": (800, 2000), "memory.dram_gb_per_s": (80, 500), "latency.dram_cycles": (300, 800)}
     return variants(run.machine, {key: random.uniform(low, high, count) for key, (low, high) in ends.items()})
 
 
