@@ -93,7 +93,7 @@ def _balanced(whole: Opened, timing: Timing, sms: int) -> Timing:
     terms[Term.BALANCE], terms[Term.LATENCY] = 0.0, terms[Term.LATENCY] * share
     units = units._replace(sm=units.sm * share, alone=units.alone * share, way=units.way * share)
     if timing.fidelity == "schedule":
-        schedule_launch(units, terms, False, row)
+        schedule_launch(units, play(units), terms, False, row)
     else:
         bound_launch(terms, units.way, row)
     return _timed(timing, float(row[Result.CYCLES]), int(row[Result.BOUND]))

@@ -5,14 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, TAIL, Fact, bound_launch, bound_terms
+from tilestamp.models.bounds import COLUMNS, TAIL, Fact, Term, bound_launch, bound_terms
 from tilestamp.models.demand import SUMS, Demand, Whole, demands, rates
 from tilestamp.models.events import EVENTS
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.numbers import Number as M
-from tilestamp.models.schedule import Loads, load_units, loads, schedule_launch
+from tilestamp.models.schedule import Loads, Played, load_units, loads, play, schedule_launch
 
 
 def launch_prices(
@@ -68,22 +68,27 @@ def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np
 
 @kernel
 def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, scheduled: bool, prices: Any) -> None:
-    """Fill in all rows; what units ask for is made anew where the rates are others."""
+    """Fill in all rows; what units ask for, and how the SMs work them off, is made anew where it is another."""
     count = launch.units
     units = Demand(np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count))
     sm, alone = np.empty(count), np.empty(count)
     seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
+    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
         matrix = rates(launch, machine, fact[Fact.LOAD_MISS], totals)
         if (matrix != seen).any():
             whole = demands(events, matrix, units)
             load_units(units, sm, alone)
-            seen = matrix
+            seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0)
         terms = bound_terms(launch, whole, totals, machine, fact)
         row[:TAIL] = terms
         if scheduled:
             loaded = loads(launch, (sm, alone), events[E.ATOMIC_REQUESTS], terms, whole.way, machine, fact)
-            schedule_launch(loaded, terms, loaded.sms < machine[M.SM_COUNT], row)
+            queue = terms[Term.QUEUE] if launch.drawn else 0.0
+            now = (float(loaded.places), float(loaded.sms), loaded.interval, loaded.start, queue)
+            if now != settled:
+                played, settled = play(loaded), now
+            schedule_launch(loaded, played, terms, loaded.sms < machine[M.SM_COUNT], row)
         else:
             bound_launch(terms, whole.way, row)

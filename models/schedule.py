@@ -194,10 +194,9 @@ def _neighbours(units: Loads) -> float:
 
 
 @kernel
-def schedule_launch(units: Loads, terms: Any, some_idle: bool, row: Any) -> None:
+def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, row: Any) -> None:
     """Fill in a row of ``Result`` by the schedule; ``some_idle``: whether an SM gets nothing."""
     least, before = longest(terms, units.way), terms[Term.LAUNCH]
-    played = play(units)
     cycles = max(least, together(units, played, units.begun + played.end, IN_THE_WAY))
     row[Result.CYCLES] = before + cycles
     row[Result.LOW] = before + max(least, together(units, played, units.begun + played.low, 0.0))
