@@ -68,7 +68,7 @@ def cluster_backend(client: "Client") -> Any:
 
     class Backend(DaskDistributedBackend):  # type: ignore[misc]  # joblib has no types
         def effective_n_jobs(self, n_jobs: int) -> int:
-            return max(2, super().effective_n_jobs(n_jobs))  # of one worker joblib would make none, and work here
+            return max(2, int(super().effective_n_jobs(n_jobs)))  # of one worker joblib would make none, and work here
 
         def submit(self, func: Any, callback: Any = None) -> Any:
             future = super().submit(func, callback)
