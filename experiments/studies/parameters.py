@@ -63,8 +63,8 @@ class Pricing:
     machine: Machine
     changes: dict[str, Any]
     fidelity: Fidelity
-    shape: Simt | None
-    """What counting depends on; None where the changes contradict each other."""
+    shapes: tuple[Simt | None, Simt | None]
+    """What counting depends on, without and with the number of SMs; None where the changes contradict each other."""
     digest: bytes
 
     def altered(self) -> Machine:
@@ -129,8 +129,9 @@ class Resolver:
                     changes[key] = number
         changes = {key: value for key, value in changes.items() if value != number_of(machine, key)}
         shape = self._shape(machine, changes)
+        shapes = shape and shape._replace(sms=0), shape
         what = [machine.digest, sorted(changes.items()), given["fidelity"]]
-        return Pricing(machine, changes, given["fidelity"], shape, _digest(what))
+        return Pricing(machine, changes, given["fidelity"], shapes, _digest(what))
 
     def _once(self, key: Hashable, make: Callable[[], T]) -> T:
         """Make something once."""

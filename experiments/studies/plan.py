@@ -76,11 +76,11 @@ def walk(
         execution = resolver.execution(executed, error)
         waiting: dict[Hashable, list[Cell]] = {}
         for row in product(*(part.choices for part in parts)):
-            pricing = _pricing(fixed, [only for _, _, only in row], resolver, known)
+            pricing = _pricing(fixed, [only for _, _, only in row if only], resolver, known)
             key = cell_key(execution, pricing)
             order = sum(place * stride for (place, _, _), stride in zip(row, strides, strict=True))
             shown = _united({}, (choice.shown for _, choice, _ in row))
-            shape = _shape(execution, pricing)
+            shape = pricing.shapes[execution.persistent]
             cells = waiting.setdefault(shape, [])
             cells.append(Cell(order, key, shown, pricing))
             if len(cells) == most:
@@ -114,13 +114,6 @@ def _parts(factor: Factor) -> list[_Part]:
         mark = tuple(sorted((name, str(identity(value))) for name, value in executed.items()))
         parts.setdefault(mark, _Part(executed, [])).choices.append((place, choice, priced))
     return list(parts.values())
-
-
-def _shape(execution: Execution, pricing: Pricing) -> Hashable:
-    """What of the machine the execution depends on."""
-    if pricing.shape is None or execution.persistent:
-        return pricing.shape
-    return pricing.shape._replace(sms=0)
 
 
 def _united(first: Mapping[str, Any], others: Iterable[dict[str, Any]]) -> dict[str, Any]:
