@@ -1,6 +1,7 @@
 """``tilestamp study``: the cells of a study file, those that are missing, into a store."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,24 +54,23 @@ def study(
         Write the table as .csv, or as .parquet where pyarrow is installed.
     """
     _check(output, jobs)
-    read = StudyFile(file)
-    kept = Store(store or file.with_suffix(".sqlite"), create=not dry_run)
+    read, path = StudyFile(file), store or file.with_suffix(".sqlite")
     try:
-        asked = read.study(kept)
-        _agree(len(asked), yes=yes or dry_run)
-        with progress("looking at the study") as say:
-            expected = asked.forecast(jobs)
+        with closing(Store(path, create=False)) as kept:  # nothing is written before all is known to be right
+            asked = read.study(kept)
+            _agree(len(asked), yes=yes or dry_run)
+            with progress("looking at the study"):
+                expected = asked.forecast(jobs)
         sys.stdout.write(f"{asked.title or file.stem}: {expected.sentence()}\n")
         sys.stdout.flush()
         if dry_run:
             return 0
-        with progress("running the study") as say:
+        with closing(Store(path)) as kept, progress("running the study") as say:
+            asked = read.study(kept)
             summary = asked.run(jobs, cluster, say)
             table = asked.table()
     except StudyError as error:
         raise read.placed(error) from None
-    finally:
-        kept.close()
     sys.stdout.writelines(f"{sentence}\n" for sentence in (*summary.changed, *summary.sentences()))
     _print(table, asked.title or file.stem)
     if output is not None:

@@ -4,12 +4,12 @@ A worker that dies takes no task with it: what it had is given to another one.
 """
 
 import signal
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from tilestamp.experiments.harness.cluster import cluster_backend, cluster_client
 from tilestamp.models.errors import TilestampError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 RETRIES = 3  # deaths of workers in a row, between which no task ended
-LOCAL = "local"  # a cluster that is started here
+IDLE = 20.0  # seconds after which a process without work ends: those of a parent that was killed, too
 
 
 def unordered(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
@@ -47,28 +47,36 @@ class Pool:
         Raises
         ------
         TilestampError
-            Workers die again and again.
+            A task ends each process that takes it.
         """
         from joblib import delayed, parallel_config
+
+        settings, died, deaths = self._backend()
+        left = dict(enumerate(tasks))
+        while left:
+            calls = [delayed(_numbered)(function, *item) for item in left.items()]
+            try:
+                with parallel_config(**settings):
+                    for number, result in unordered(calls, self.jobs):
+                        del left[number]
+                        deaths = RETRIES
+                        yield result
+            except died:
+                if not deaths:
+                    raise TilestampError(
+                        "a task ended each worker process that took it: out of memory? try -j 1, or smaller frames"
+                    ) from None
+                deaths -= 1
+
+    def _backend(self) -> tuple[dict[str, Any], type[Exception], int]:
+        """Settings of joblib, what it raises where a worker died, and how many deaths in a row are borne."""
+        if self._client is not None:
+            from distributed import KilledWorker
+
+            return {"backend": cluster_backend(self._client)}, KilledWorker, 0  # it has tried again by itself
         from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-        left, deaths = dict(enumerate(tasks)), 0
-        backend = {"backend": "dask", "client": self._client} if self._client else {"backend": "loky"}
-        while left:
-            try:
-                with parallel_config(**backend):
-                    for number, result in unordered(
-                        [delayed(_numbered)(function, *item) for item in left.items()], self.jobs
-                    ):
-                        del left[number]
-                        deaths = 0
-                        yield result
-            except TerminatedWorkerError:
-                deaths += 1
-                if deaths > RETRIES:
-                    raise TilestampError(
-                        f"worker processes ended before their time, {deaths} times in a row: out of memory? try -j 1"
-                    ) from None
+        return {"backend": "loky", "idle_worker_timeout": IDLE}, TerminatedWorkerError, RETRIES
 
 
 def _numbered(function: Callable[[T], R], number: int, task: T) -> tuple[int, R]:
@@ -92,7 +100,7 @@ def pool(jobs: int, cluster: str | None = None) -> Iterator[Pool]:
         dask.distributed is not installed, or there is no scheduler at the address.
     """
     if cluster is not None:
-        with _client(jobs, cluster) as client:
+        with cluster_client(jobs, cluster) as client:
             yield Pool(max(sum(client.ncores().values()), 1), client)
         return
     try:
@@ -108,39 +116,3 @@ def end_processes() -> None:
     from joblib.externals.loky import get_reusable_executor
 
     get_reusable_executor(reuse=True).shutdown(kill_workers=True)
-
-
-@contextmanager
-def _client(jobs: int, cluster: str) -> "Iterator[Client]":
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise TilestampError("--cluster needs dask.distributed: python -m pip install 'tilestamp[cluster]'") from None
-    if cluster == LOCAL:
-        with (
-            _main_left_alone(),
-            LocalCluster(
-                n_workers=jobs, threads_per_worker=1, dashboard_address=None, worker_dashboard_address=None
-            ) as started,
-            Client(started) as client,
-        ):
-            yield client
-        return
-    try:
-        client = Client(cluster, timeout=10)
-    except (OSError, ValueError, TypeError) as error:
-        raise TilestampError(f"--cluster {cluster}: no scheduler answers there ({error})") from error
-    with client:
-        yield client
-
-
-@contextmanager
-def _main_left_alone() -> Iterator[None]:
-    """Keep multiprocessing from running the main script again in each new process: workers need nothing of it."""
-    main = sys.modules["__main__"]
-    kept: dict[str, Any] = {name: main.__dict__.pop(name) for name in ("__file__", "__spec__") if name in main.__dict__}
-    main.__dict__["__spec__"] = None
-    try:
-        yield
-    finally:
-        main.__dict__.update(kept)

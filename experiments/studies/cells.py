@@ -1,8 +1,8 @@
 """The cells of a study beside what the store has of them."""
 
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.parameters import Resolver
@@ -15,33 +15,32 @@ from tilestamp.models.errors import TilestampError
 if TYPE_CHECKING:
     import pandas as pd
 
+T = TypeVar("T")
 MOST_PRICED = 250  # cells of one group
 MOST_ROWS = 10_000_000  # of a table
 COARSE = "coarse"  # column of a study with a question: whether a cell is known less well than the error
 
 
-def looked_up(study: Design, resolver: Resolver, error: float) -> Iterator[tuple[Group, dict[bytes, Stored]]]:
-    """Go through all groups of a study, each with what is stored of its cells at an error."""
+def looked_up(
+    study: Design, resolver: Resolver, error: float, look: Callable[[list[bytes], Sequence[str]], T]
+) -> Iterator[tuple[Group, T]]:
+    """Go through all groups of a study, each with what the store says of its cells at an error (and of others)."""
     waiting: list[Group] = []
-    keys = 0
+    keys: list[bytes] = []
     for group in walk(study.factors, study.fixed, resolver, error, MOST_PRICED):
         waiting.append(group)
-        keys += len(group.cells)
-        if keys >= MANY:
-            yield from _found(study, waiting)
-            waiting, keys = [], 0
-    yield from _found(study, waiting)
-
-
-def _found(study: Design, groups: list[Group]) -> Iterator[tuple[Group, dict[bytes, Stored]]]:
-    keys = [cell.key for group in groups for cell in group.cells]
-    found = study.kept.find(keys, study.record)
-    return ((group, found) for group in groups)
+        keys += [cell.key for cell in group.cells]
+        if len(keys) >= MANY:
+            found = look(keys, study.record)
+            yield from ((group, found) for group in waiting)
+            waiting, keys = [], []
+    found = look(keys, study.record)
+    yield from ((group, found) for group in waiting)
 
 
 def missing(study: Design, resolver: Resolver, error: float, wanted: Container[int] | None = None) -> Iterator[Group]:
     """Go through the groups of cells that are not stored; of those whose place is ``wanted``, if that is given."""
-    for group, found in looked_up(study, resolver, error):
+    for group, found in looked_up(study, resolver, error, study.kept.has):
         cells = [cell for cell in group.cells if cell.key not in found and (wanted is None or cell.order in wanted)]
         if cells:
             yield group._replace(cells=cells)
@@ -54,7 +53,7 @@ def rows(study: Design) -> list[tuple[Cell, Stored]]:
     resolver = Resolver()
     found: dict[int, tuple[Cell, Stored]] = {}
     for error in study.errors:
-        for group, stored in looked_up(study, resolver, error):
+        for group, stored in looked_up(study, resolver, error, study.kept.find):
             found.update((cell.order, (cell, stored[cell.key])) for cell in group.cells if cell.key in stored)
     return [found[order] for order in sorted(found)]
 

@@ -51,12 +51,9 @@ class Execution:
     seed: int
     error: float
     sources: str
+    persistent: bool
+    """Whether the work depends on the number of SMs."""
     digest: bytes
-
-    @property
-    def persistent(self) -> bool:
-        """Whether the work depends on the number of SMs."""
-        return options_type(self.pipeline).persistent
 
 
 @dataclass(frozen=True)
@@ -66,8 +63,8 @@ class Pricing:
     machine: Machine
     changes: dict[str, Any]
     fidelity: Fidelity
-    shape: Simt | None
-    """What counting depends on; None where the changes contradict each other."""
+    shapes: tuple[Simt | None, Simt | None]
+    """What counting depends on, without and with the number of SMs; None where the changes contradict each other."""
     digest: bytes
 
     def altered(self) -> Machine:
@@ -94,9 +91,9 @@ class Resolver:
         given: dict[str, Any] = SHARED | {name: value for name, value in parameters.items() if not is_priced(name)}
         if "scene" not in given:
             raise TilestampError("a study needs a scene: scene = ... among what is fixed, or as an axis")
+        pipeline = given["pipeline"]
         with place("pipeline"):
-            sources = self._input("sources", given["pipeline"], lambda: sources_digest(given["pipeline"]))
-            options_type(given["pipeline"])
+            sources = self._input("sources", pipeline, lambda: sources_digest(pipeline))
         with place("size"):
             width, height = pixels(given["size"])
         with place("scene"):
@@ -107,9 +104,10 @@ class Resolver:
         options = self._options(given)
         with place("seed"):
             seed = checked("seed", int, given["seed"])
-        what = [digest, given["pipeline"], options, width, height, matrix, seed, error, sources]
+        what = [digest, pipeline, options, width, height, matrix, seed, error, sources]
+        persistent = self._once(("persistent", pipeline), lambda: options_type(pipeline).persistent)
         return Execution(
-            source, digest, given["pipeline"], options, width, height, matrix, seed, error, sources, _digest(what)
+            source, digest, pipeline, options, width, height, matrix, seed, error, sources, persistent, _digest(what)
         )
 
     def pricing(self, parameters: Mapping[str, Any]) -> Pricing:
@@ -131,8 +129,9 @@ class Resolver:
                     changes[key] = number
         changes = {key: value for key, value in changes.items() if value != number_of(machine, key)}
         shape = self._shape(machine, changes)
+        shapes = shape and shape._replace(sms=0), shape
         what = [machine.digest, sorted(changes.items()), given["fidelity"]]
-        return Pricing(machine, changes, given["fidelity"], shape, _digest(what))
+        return Pricing(machine, changes, given["fidelity"], shapes, _digest(what))
 
     def _once(self, key: Hashable, make: Callable[[], T]) -> T:
         """Make something once."""

@@ -3,7 +3,7 @@
 Nothing is listed that does not have to be: a study may have more cells than fit in memory.
 """
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -70,17 +70,17 @@ def walk(
     sizes = [len(factor) for factor in factors]
     strides = [prod(sizes[place + 1 :]) for place in range(len(sizes))]
     known: dict[Hashable, Pricing] = {}
-    for parts in product(*map(_parts, factors)):
+    gathered = list(map(_parts, factors))
+    for parts in product(*gathered):
         executed = _united(fixed, (part.executed for part in parts))
         execution = resolver.execution(executed, error)
         waiting: dict[Hashable, list[Cell]] = {}
         for row in product(*(part.choices for part in parts)):
-            priced = _united(fixed, (only for _, _, only in row))
-            pricing = _pricing(priced, resolver, known)
+            pricing = _pricing(fixed, [only for _, _, only in row if only], resolver, known)
             key = cell_key(execution, pricing)
             order = sum(place * stride for (place, _, _), stride in zip(row, strides, strict=True))
             shown = _united({}, (choice.shown for _, choice, _ in row))
-            shape = _shape(execution, pricing)
+            shape = pricing.shapes[execution.persistent]
             cells = waiting.setdefault(shape, [])
             cells.append(Cell(order, key, shown, pricing))
             if len(cells) == most:
@@ -93,13 +93,15 @@ def identity(value: object) -> Hashable:
     return repr(value) if isinstance(value, PLAIN) else id(value)
 
 
-def _pricing(priced: Mapping[str, Any], resolver: Resolver, known: dict[Hashable, Pricing]) -> Pricing:
-    """Resolve what is priced, once while it is remembered."""
-    mark = tuple((name, identity(value)) for name, value in priced.items())
+def _pricing(
+    fixed: Mapping[str, Any], parts: list[dict[str, Any]], resolver: Resolver, known: dict[Hashable, Pricing]
+) -> Pricing:
+    """Resolve what is priced, once while it is remembered: the parts are the study's own, and the same ones again."""
+    mark = tuple(map(id, parts))
     if mark not in known:
         if len(known) == MOST_PRICINGS:
             known.clear()
-        known[mark] = resolver.pricing(priced)
+        known[mark] = resolver.pricing(_united(fixed, parts))
     return known[mark]
 
 
@@ -114,14 +116,7 @@ def _parts(factor: Factor) -> list[_Part]:
     return list(parts.values())
 
 
-def _shape(execution: Execution, pricing: Pricing) -> Hashable:
-    """What of the machine the execution depends on."""
-    if pricing.shape is None or execution.persistent:
-        return pricing.shape
-    return pricing.shape._replace(sms=0)
-
-
-def _united(first: Mapping[str, Any], others: "Iterator[dict[str, Any]]") -> dict[str, Any]:
+def _united(first: Mapping[str, Any], others: Iterable[dict[str, Any]]) -> dict[str, Any]:
     united = dict(first)
     for other in others:
         united.update(other)

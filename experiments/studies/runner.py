@@ -19,7 +19,7 @@ from tilestamp.experiments.studies.values import PRICED, SHARED
 from tilestamp.experiments.studies.work import Outcome, Task, perform
 from tilestamp.models.errors import TilestampError
 
-WINDOW = 10_000  # groups that are listed at once
+WINDOW = 400  # groups that are listed at once
 FEWEST = 25  # cells of a group that is taken apart, so that all processes have work
 OFTEN = 0.5  # seconds between two words on how far it is
 

@@ -147,17 +147,21 @@ class Store:
 
     def find(self, keys: Iterable[bytes], record: Sequence[str]) -> dict[bytes, Stored]:
         """Give what the store has of some cells, of those of which all of ``record`` is stored."""
-        wanted, found = set(record), {}
-        with self._sentences():
-            for row in self._rows(iter(keys)):
-                if row[3] or wanted <= _names(row[1]):
-                    found[row[0]] = Stored(msgspec.json.decode(row[2]), row[3])
-        return found
+        rows = self._rows(iter(keys), record, "numbers")
+        return {key: Stored(msgspec.json.decode(numbers), problem) for key, _, problem, numbers in rows}
 
-    def _rows(self, keys: Iterator[bytes]) -> Iterator[tuple[bytes, str, str, str]]:
-        while some := list(islice(keys, MANY)):
-            query = f"SELECT key, recorded, numbers, problem FROM cells WHERE key IN ({','.join('?' * len(some))})"  # noqa: S608 - question marks
-            yield from self._base.execute(query, some)
+    def has(self, keys: Iterable[bytes], record: Sequence[str]) -> set[bytes]:
+        """Give those of some cells of which all of ``record`` is stored."""
+        return {row[0] for row in self._rows(iter(keys), record, "''")}
+
+    def _rows(self, keys: Iterator[bytes], record: Sequence[str], last: str) -> Iterator[tuple[bytes, str, str, str]]:
+        wanted = set(record)
+        with self._sentences():
+            while some := list(islice(keys, MANY)):
+                marks = ",".join("?" * len(some))
+                query = f"SELECT key, recorded, problem, {last} FROM cells WHERE key IN ({marks})"  # noqa: S608 - no data
+                rows = self._base.execute(query, some).fetchall()
+                yield from (row for row in rows if row[2] or wanted <= _names(row[1]))
 
     def changed_inputs(self, inputs: Mapping[tuple[str, str], str]) -> list[tuple[str, str]]:
         """Kind and name of those inputs that were others when this store was last used; they are noted anew."""

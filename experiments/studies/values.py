@@ -96,7 +96,12 @@ def option(pipeline: str, name: str, value: object) -> Any:
             f"{name} is no option of the pipeline {pipeline}, and nothing else that a study can set"
             f"{did_you_mean(name, known)}; it has {', '.join(types) or 'none'}"
         )
-    return checked(name, types[name], value)
+    try:
+        return checked(name, types[name], value)
+    except TilestampError as error:
+        if isinstance(value, list):
+            raise TilestampError(f"{error}; several values make an axis, in [grid]") from error
+        raise
 
 
 def pixels(size: object) -> tuple[int, int]:

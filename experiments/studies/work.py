@@ -179,8 +179,10 @@ def _scene(execution: Execution) -> Scene:
     if isinstance(execution.scene, Scene):
         return execution.scene
     scene, digest = _loaded(execution.scene)
-    if digest != execution.scene_digest:
+    if digest != execution.scene_digest:  # as it was for a study before
         _loaded.cache_clear()
+        scene, digest = _loaded(execution.scene)
+    if digest != execution.scene_digest:
         raise TilestampError(f"the scene {execution.scene} is another one than when the study began: run it again")
     return scene
 
