@@ -7,7 +7,7 @@ from numba import get_num_threads, set_num_threads
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.simulator.pipelines import load_pipeline, pipeline_names
+from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_names
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
 
@@ -43,6 +43,11 @@ def test_triangle_ids_are_minus_one_or_an_input_index(run):
     assert run.triangle_ids.dtype == np.int32
     assert run.triangle_ids.min() == -1
     assert run.triangle_ids.max() >= 0
+
+
+def test_a_queue_that_as_many_blocks_as_sms_share_is_declared_with_the_options(run):
+    queued = any(isinstance(work, Work) and work.dispatch != "blocks" for work in run.frame.works)
+    assert options_type(run.pipeline).persistent == queued
 
 
 def test_no_event_is_negative(run):

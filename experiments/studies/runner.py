@@ -47,7 +47,8 @@ class Summary:
         """Say it."""
         said = [f"{self.cells:,} cells: {self.new:,} run by {self.executions:,} executions in {duration(self.seconds)}"]
         if self.saved_executions > 0:
-            said[0] += f"; repricing saved {self.saved_executions:,} executions, about {duration(self.saved_seconds)}"
+            about = f", about {duration(self.saved_seconds)}" if self.saved_seconds else ""
+            said[0] += f"; repricing saved {self.saved_executions:,} executions{about}"
         if self.coarse:
             said.append(f"{self.coarse:,} cells cannot be the best, and were left coarse (column coarse)")
         if self.problems:

@@ -39,10 +39,16 @@ def number_of(machine: Machine, key: str) -> Any:
 
 def is_whole(name: str, pipelines: Iterable[str]) -> bool:
     """Whether a parameter is a whole number."""
-    if "." in name and not name.startswith(TIMES):
-        return _hint(name) is not None and _takes_whole_numbers_only(_hint(name))
+    if "." in name:
+        return _is_whole_number(name)
     kinds = [f.type for p in pipelines for f in msgspec.structs.fields(options_type(p)) if f.name == name]
     return name == "seed" or (bool(kinds) and all(map(_takes_whole_numbers_only, kinds)))
+
+
+@cache
+def _is_whole_number(key: str) -> bool:
+    """Whether a number of a machine is a whole one; a factor is not."""
+    return _hint(key) is not None and _takes_whole_numbers_only(_hint(key))
 
 
 def _takes_whole_numbers_only(kind: object) -> bool:
