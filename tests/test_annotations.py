@@ -20,6 +20,7 @@ FOREIGN = {  # what they take belongs to a library without types
     "models/kernel_digest.py": "numba",
     "simulator/stages/borrow.py": "numba",
     "simulator/stages/laine2011/exact.py": "numba",
+    "experiments/harness/cluster.py": "joblib",
     "experiments/validation/gpu_cases.py": "CuPy",
     "experiments/validation/measuring_sm.py": "CuPy",
 }
