@@ -1,7 +1,10 @@
 """``tilestamp compare`` and ``render --why``: what is printed is what the runs say, on narrow terminals too."""
 
 import json
+import subprocess
+import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -157,3 +160,17 @@ def test_render_writes_what_explains_a_run(tmp_path, capsys):
 def test_what_cannot_be_explained_is_refused_before_anything_is_drawn(flags, says, capsys):
     assert run_command(["render", "no-such-scene", *flags]) == BAD_INPUT
     assert says in capsys.readouterr().err
+
+
+def test_what_is_wrong_with_the_last_run_is_said_before_the_first_is_drawn(capsys):
+    assert run_command(["compare", "teapot", *SMALL, "--machine", "gtx280", "--machine", "gtx28"]) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full: a device that is always full")
+def test_a_full_disk_is_one_sentence():
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "tilestamp", "list", "machines"]
+        said = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert said.returncode == BAD_INPUT
+    assert said.stderr == "tilestamp: the output cannot be written (No space left on device)\n"

@@ -55,7 +55,7 @@ def test_units_begin_and_end_within_the_part_of_their_launch(events):
     for pid in {e["pid"] for e in slices(events)}:
         part = next(e for e in parts(events, pid) if e["name"] == "units on the SMs")
         mine = slices(events, pid)
-        rounding = 1.01 * part["dur"] / 100_000 + NANOSECOND
+        rounding = 1.01 * part["dur"] / 30_000 + NANOSECOND
         assert min(e["ts"] for e in mine) >= part["ts"] - rounding
         assert max(e["ts"] + e["dur"] for e in mine) == pytest.approx(part["ts"] + part["dur"], abs=rounding)
 
