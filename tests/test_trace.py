@@ -7,7 +7,7 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from tilestamp import TilestampError, simulate
+from tilestamp import TilestampError, altered, load_machine, simulate
 from tilestamp.experiments.commands import trace
 from tilestamp.reports.chrome_trace import Process, write_trace
 from tilestamp.simulator.timeline import timeline
@@ -162,3 +162,11 @@ def test_what_an_sm_has_taken_is_the_time_of_its_units(run):
         spent = np.bincount(launch.sm, launch.stop - launch.start, launch.sms)
         assert (taken * launch.slots).sum(axis=1) * edges[1] == pytest.approx(spent)
         assert taken.max(initial=0.0) <= 1 + 1e-9
+
+
+def test_a_queue_that_is_served_in_time_has_no_backlog():
+    quick = altered(load_machine("gtx280"), {"atomics.unit_ns_per_request": 0.01, "atomics.conflict_ns": 0.0})
+    run = simulate("teapot", machine=quick, width=160, height=120, picture=False)
+    backlogs = [t.counters["atomic backlog us"][1] for t in timeline(run) if "atomic backlog us" in t.counters]
+    assert backlogs
+    assert min(values.min() for values in backlogs) == 0.0
