@@ -1,5 +1,6 @@
 """The command ``tilestamp``: parses arguments, turns errors into one sentence and an exit code."""
 
+import errno
 import os
 import signal
 import sys
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 BAD_INPUT = 2
 INTERRUPTED = 130
 TERMINATED = 143
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 HELP = "Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time."
 
 
@@ -41,7 +43,8 @@ def run_command(arguments: list[str]) -> int:
         0; 1 where an experiment failed; 2 for bad input; 130 after Ctrl-C; 143 after SIGTERM.
     """
     try:  # the imports too: they take a second in which a user may change his mind
-        return _run(arguments)
+        code = _run(arguments)
+        sys.stdout.flush()
     except KeyboardInterrupt:
         sys.stderr.write("tilestamp: interrupted; nothing was half-written\n")
         return INTERRUPTED
@@ -51,6 +54,13 @@ def run_command(arguments: list[str]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still to be written goes nowhere
+        sys.stderr.write(f"tilestamp: the output cannot be written ({error.strerror})\n")
+        return BAD_INPUT
+    return code
 
 
 def _run(arguments: list[str]) -> int:

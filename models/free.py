@@ -126,11 +126,9 @@ def level(units: Loads) -> float:
 
 
 def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:
-    """All places, SMs and draws busy from the first unit to the end, blocks started at their rate."""
+    """All places and SMs busy from the first unit to the end; the terms see to draws and to starts."""
     count = len(alone)
     return max(
         float(alone.sum()) / min(places, count),
         units.start + float(units.sm.sum()) / min(units.sms, count),
-        float(units.draws.sum()) + float(alone.min()),
-        units.interval * (count - 1) + float(alone.min()),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEVEL = 5  # of compression
-STEPS = 100_000  # that the resolution of a process divides it into, at least
+STEPS = 30_000  # that the resolution of a process divides it into, at least
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 
 
@@ -95,11 +95,11 @@ def _named(pid: int, tid: int, kind: str, name: str) -> str:
     return f'{{"ph":"M","pid":{pid},"tid":{tid},"name":"{kind}","args":{{"name":{json.dumps(name)}}}}}'
 
 
-def _slices(pid: int, process: Process, together: int) -> Iterator[str]:
+def _slices(pid: int, process: Process, together: int) -> list[str]:
     """Lines of the slices in the order of their starts, which compresses best."""
     order = np.lexsort((process.start, process.thread))
     if not len(order):
-        return
+        return []
     thread = process.thread[order]
     rank = np.arange(len(order)) - np.searchsorted(thread, thread)  # among those of its thread
     first = np.flatnonzero(rank % together == 0)
@@ -110,21 +110,13 @@ def _slices(pid: int, process: Process, together: int) -> Iterator[str]:
     digits = int(np.clip(np.ceil(np.log10(STEPS / max(float(process.stop.max() - process.start.min()), 1e-4))), 0, 4))
     ticks = np.rint(np.array([process.start[begins], process.stop[ends]]) * 10**digits) / 10**digits
     by_start = np.argsort(process.start[begins], kind="stable")
-    columns = (
-        process.thread[begins],
-        ticks[0],
-        ticks[1] - ticks[0],
-        process.label[longest],
-        process.number[begins],
-        np.add.reduceat(process.amount[order], first),
-        last - first + 1,
-    )
-    for tid, begin, length, label, number, amount, units in zip(*(c[by_start].tolist() for c in columns), strict=True):
-        merged = f',"units":{units}' if together > 1 else ""
-        yield (
-            f'{{"ph":"X","pid":{pid},"tid":{tid},"ts":{begin:.{digits}f},"dur":{length:.{digits}f},'
-            f'"name":"{process.labels[label]}","args":{{"{process.unit}":{number},"{process.what}":{amount}{merged}}}}}'
-        )
+    columns = [process.thread[begins], ticks[0], ticks[1] - ticks[0], np.array(process.labels)[process.label[longest]]]
+    columns += [process.number[begins], np.add.reduceat(process.amount[order], first)]
+    columns += [last - first + 1] if together > 1 else []
+    merged = ',"units":%d' if together > 1 else ""
+    line = f'{{"ph":"X","pid":{pid},"tid":%d,"ts":%.{digits}f,"dur":%.{digits}f,"name":"%s","args":{{'
+    line += f'"{process.unit}":%d,"{process.what}":%d{merged}}}}}'
+    return [line % row for row in zip(*(column[by_start].tolist() for column in columns), strict=True)]
 
 
 def _longest(lengths: Numbers, first: NDArray[np.int64]) -> NDArray[np.int64]:

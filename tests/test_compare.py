@@ -1,7 +1,10 @@
 """``tilestamp compare`` and ``render --why``: what is printed is what the runs say, on narrow terminals too."""
 
 import json
+import subprocess
+import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -124,6 +127,10 @@ def test_why_has_a_sentence_a_stage_and_no_line_over_80_columns(narrow, capsys):
     assert max(len(line) for line in tables) <= 80
     assert sum("held by" in line for line in lines) >= 5
     assert "blocks start one after another" in " ".join(lines)
+    quiet = next(line.split() for line in lines if line.startswith("quiet"))
+    assert (
+        0 < int(quiet[1]) < len(load_machine("gtx280").provenance) - len(lines[-1].split()) - 10
+    )  # at least ten are said
 
 
 def test_why_in_json_has_every_number(capsys):
@@ -157,3 +164,17 @@ def test_render_writes_what_explains_a_run(tmp_path, capsys):
 def test_what_cannot_be_explained_is_refused_before_anything_is_drawn(flags, says, capsys):
     assert run_command(["render", "no-such-scene", *flags]) == BAD_INPUT
     assert says in capsys.readouterr().err
+
+
+def test_what_is_wrong_with_the_last_run_is_said_before_the_first_is_drawn(capsys):
+    assert run_command(["compare", "teapot", *SMALL, "--machine", "gtx280", "--machine", "gtx28"]) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full: a device that is always full")
+def test_a_full_disk_is_one_sentence():
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "tilestamp", "list", "machines"]
+        said = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)  # noqa: S603 - our own
+    assert said.returncode == BAD_INPUT
+    assert said.stderr == "tilestamp: the output cannot be written (No space left on device)\n"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import schedule
+from tests.pricing import bounds, schedule
 from tests.test_schedule import NOTHING, launch, work_cycles
 from tests.test_time_properties import MACHINES, launches
 from tilestamp.models.errors import TilestampError
@@ -45,7 +45,7 @@ def test_free_of_a_term_a_launch_takes_as_long_as_without_its_events(term, dispa
     machine = altered(GTX480, {"latency.block_launch_cycles": 0.0}, "assumed", "a test")
     rng = np.random.default_rng(1)
     what = launch(700, dispatch=dispatch, grid=60, **{name: n * rng.random(700) for name, n in EVENTS.items()})
-    what = replace(what, atomic_requests=np.full(40, 300))
+    what = replace(what, atomic_requests=np.full(40, 30000))
     events = what.events.copy()
     events[:, [MachineEvent[name] for name in CAUSES[term]]] = 0.0
     never = replace(what, events=events, atomic_requests=None if term == "atomics" else what.atomic_requests)
@@ -75,6 +75,25 @@ def test_free_of_balance_sixteen_blocks_take_as_long_as_132_of_a_share_each():
     assert work_cycles(freed(few, H200, "balance")) == pytest.approx(
         work_cycles(schedule(many, H200, NOTHING)), rel=0.01
     )
+
+
+def test_free_of_balance_a_chain_is_shared_out_too_in_a_roofline():
+    what = launch(16, 512, CHAIN_ALU=300000)
+    now = bounds(what, H200, NOTHING)
+    freed_ = without([what], H200, [now], "balance")[0]
+    assert work_cycles(freed_) == pytest.approx(work_cycles(now) * 16 / 132)
+
+
+def test_free_of_the_tail_units_that_all_begin_at_once_take_their_mean():
+    chain = np.linspace(10000, 90000, 264)
+    what = launch(264, CHAIN_ALU=chain)
+    mean = launch(264, CHAIN_ALU=chain.mean())
+    assert work_cycles(freed(what, H200, "tail")) == pytest.approx(work_cycles(schedule(mean, H200, NOTHING)), rel=0.01)
+
+
+def test_free_of_the_tail_draws_still_pass_one_after_another():
+    what = replace(launch(700, dispatch="block_queue", grid=60, ATOMIC_REQUESTS=1), atomic_requests=np.array([700000]))
+    assert freed(what, H200, "tail").cycles == pytest.approx(schedule(what, H200, NOTHING).cycles, rel=0.01)
 
 
 def test_balance_costs_nothing_where_every_sm_has_a_unit():

@@ -49,6 +49,11 @@ def test_a_whole_number_steps_and_has_no_elasticity(run, found, key, step):
         assert row["more"] == pytest.approx(after[stage] / rows_now(found)[stage])
 
 
+def test_a_unit_of_allocation_is_halved_and_doubled(run, found):
+    row = rows_of(found, "sm.register_unit").loc[FRAME]
+    assert [row["lower"], row["higher"]] == [run.machine.sm.register_unit // 2, run.machine.sm.register_unit * 2]
+
+
 def rows_now(found):
     return found.free["now"].to_dict()
 

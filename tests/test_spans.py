@@ -94,6 +94,12 @@ def replace_issue(machine):
     return altered(machine, {"memory.bank_pass_cycles": 20.0}, "assumed", "a test")
 
 
+@pytest.mark.parametrize(("dispatch", "before"), [("blocks", 0.0), ("block_queue", H200.latency.block_launch_cycles)])
+def test_the_first_unit_begins_after_the_overhead_and_the_start_of_persistent_blocks(dispatch, before):
+    got = spans(launch(500, dispatch=dispatch, grid=132, FP32=1000), H200, NOTHING)
+    assert got.start.min() == pytest.approx(H200.launch.kernel_us * H200.sm.clock_mhz + before)
+
+
 def test_a_drawn_unit_is_held_by_its_queue():
     what = launch(50, dispatch="block_queue", grid=20, ATOMIC_REQUESTS=900)
     got = spans(replace(what, atomic_requests=np.array([45000])), H200, NOTHING)

@@ -15,8 +15,8 @@ from tilestamp.experiments.commands.outputs import check_png
 from tilestamp.experiments.commands.render import PIPELINE, parse_size
 from tilestamp.experiments.commands.terminal import Progress, progress
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.machine import altered, load_machine
-from tilestamp.simulator.pipelines import options_type
+from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.simulator.pipelines import options_type, pipeline_options
 from tilestamp.simulator.run import Run
 
 MOST = 12  # runs beside each other
@@ -106,6 +106,8 @@ def _runs(axes: dict[str, Sequence[Any]], say: Progress) -> Iterator[Compared]:
     combinations = [dict(zip(axes, values, strict=True)) for values in product(*axes.values())]
     if len(combinations) > MOST:
         raise TilestampError(f"{len(combinations)} combinations are too many to compare: at most {MOST}")
+    for chosen in combinations:  # what is wrong with the last is said before the first is drawn
+        _machine(chosen), _options(chosen), parse_size(chosen["size"])
     several = [name for name, values in axes.items() if len(values) > 1]
     before: tuple[Any, Run] | None = None
     for chosen in combinations:
@@ -128,16 +130,12 @@ def _priced(chosen: dict[str, Any], known: Run | None) -> Run:
     """Price a run that was counted already, or simulate."""
     from tilestamp.simulator.simulation import simulate
 
-    machine = load_machine(chosen["machine"])
-    changes = {key.partition(" ")[2]: literal(value) for key, value in chosen.items() if key.startswith("--set ")}
-    machine = altered(machine, changes, "assumed", "a what-if on the command line") if changes else machine
+    machine = _machine(chosen)
     if known is not None:
         try:
             return known.on(machine)
         except TilestampError:  # counted otherwise there
             pass
-    kind = options_type(chosen["pipeline"])
-    assignments = [f"{key[3:]}={value}" for key, value in chosen.items() if key.startswith("-O ")]
     width, height = parse_size(chosen["size"])
     return simulate(
         chosen["scene"],
@@ -148,5 +146,20 @@ def _priced(chosen: dict[str, Any], known: Run | None) -> Run:
         camera=chosen["camera"],
         fidelity=chosen["fidelity"],
         picture=False,
-        **given_options(kind, {}, assignments),
+        **_options(chosen),
     )
+
+
+def _machine(chosen: dict[str, Any]) -> Machine:
+    """The machine of a combination, with its what-ifs."""
+    machine = load_machine(chosen["machine"])
+    changes = {key.partition(" ")[2]: literal(value) for key, value in chosen.items() if key.startswith("--set ")}
+    return altered(machine, changes, "assumed", "a what-if on the command line") if changes else machine
+
+
+def _options(chosen: dict[str, Any]) -> dict[str, Any]:
+    """The pipeline's options of a combination, checked."""
+    assignments = [f"{key[3:]}={value}" for key, value in chosen.items() if key.startswith("-O ")]
+    given = given_options(options_type(chosen["pipeline"]), {}, assignments)
+    pipeline_options(chosen["pipeline"], given)
+    return given
