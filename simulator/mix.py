@@ -17,6 +17,7 @@ What was fitted to measured cells says which of its columns were (``fitted = ["c
 where only so much of one was) and to which cells (``fitted_to``: ``tilestamp.models.fitted``, or the name of a list in
 the table ``fits`` of the file). Without ``fitted`` all columns of a table of provenance ``fitted`` were.
 
+``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp.
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
 """
@@ -27,7 +28,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.sums import TOGETHER, sum_up
 from tilestamp.models.used import note
 from tilestamp.simulator.work import Work
@@ -144,7 +145,7 @@ class Mix:
             shared_bytes=work.shared_bytes + kernel.shared_bytes,
             events=_machine_events(kernel.matrix(work.events, warp), work.table),
             dispatch=work.dispatch,
-            streams=work.streams,
+            streams=(*work.streams, *_local_memory(kernel, work)),
             atomic_requests=work.atomic_requests,
         )
 
@@ -166,6 +167,17 @@ def _add_up(matrix: Any, table: Any, events: Any) -> None:
             for column in range(columns):
                 block[column, i] = table[first + i, column]
         sum_up(matrix, block, 0, count, events, first)
+
+
+def _local_memory(kernel: KernelMix, work: Work) -> list[Stream]:
+    """Buffers that the mix adds to those of the stage: arrays of a thread; a work without buffers needs no more."""
+    totals = work.counts() if work.streams else {}
+
+    def local(op: Literal["load", "store"]) -> Stream:
+        moved = sum(price.get(f"{op}_bytes", 0.0) * totals.get(event, 0) for event, price in kernel.prices.items())
+        return Stream(f"{work.kernel} local", op, round(moved), round(moved))
+
+    return [stream for stream in (local("store"), local("load")) if stream.bytes]
 
 
 @cache
