@@ -19,7 +19,8 @@ the table ``fits`` of the file). Without ``fitted`` all columns of a table of pr
 
 ``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp.
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
-variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
+variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own. What it has in
+common with a table before it need not be said again: ``like = "tile_raster"``.
 """
 
 import hashlib
@@ -194,6 +195,8 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
     name = f"{pipeline}/{path.stem}"
     tables = tomllib.loads(text)
     fits = tables.pop("fits", {})
+    for kernel, table in tables.items():
+        tables[kernel] = _completed(name, tables, table)
     kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in tables.items()}
     return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
 
@@ -204,6 +207,17 @@ def _path_for(pipeline: str, major: int) -> Path:
     if not families:
         raise TilestampError(f"no instruction mix for the pipeline {pipeline} in simulator/mixes")
     return max([f for f in families if f[0] <= major] or families[:1])[1]
+
+
+def _completed(mix: str, tables: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """A table with what it leaves to the one that it is like, which stands before it."""
+    like = table.get("like")
+    if like is None:
+        return table
+    if like not in tables:
+        raise TilestampError(f"the mix {mix} has a table like {like}, which it does not have")
+    completed: dict[str, Any] = tables[like] | table
+    return completed
 
 
 def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, list[str]]) -> KernelMix:

@@ -5,14 +5,19 @@ import pytest
 
 from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.published import published
-from tilestamp.experiments.laine2011 import figure5, figure6, generated, memory, slides, sweep, table3
+from tilestamp.experiments.harness.result import Cell
+from tilestamp.experiments.laine2011 import figure5, figure6, generated, memory, slides, sweep, table2, table3
+from tilestamp.experiments.laine2011.heavy_tail import Places, heavy_tail_scene, pareto_areas
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.fitted import names_cell
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
 
-GENERATED = generated.Statistics("small", 4000, 40.0, 12.0, assumed=False)
+TRIANGLES, VISIBLE, PIXELS = 4000, 1600, 12.0
+PLACES = Places((0.45, 0.45), ellipse=False, disorder=0.1)
+SMALL = heavy_tail_scene("small", TRIANGLES, VISIBLE, PIXELS, 1.2, PLACES)
 QUAD = Scene.from_clip_space(
     [[-0.9, -0.9, 0, 1], [0.9, -0.8, 0, 1], [0.8, 0.9, 0, 1], [-0.8, 0.7, 0, 1]], [[0, 1, 2], [0, 2, 3]]
 )
@@ -26,17 +31,39 @@ def test_most_areas_drawn_by_default_are_predicted():
     assert len(set(sweep.DEFAULT_AREAS) - set(sweep.fitted_areas())) > len(sweep.DEFAULT_AREAS) / 2
 
 
-def test_what_is_fitted_in_the_mix_names_figure_5():
-    for kernel in load_mix("cudaraster", "2.0").kernels.values():
+def test_what_is_fitted_in_the_mix_names_figure_5_or_a_cell_of_table_2():
+    for name, kernel in load_mix("cudaraster", "2.0").kernels.items():
         sources = [source for kind, source in kernel.provenance.values() if kind == "fitted"]
-        assert all("Figure 5" in source or source.startswith("as ") for source in sources)
-        assert all("laine2011-figure5" in cell for number in kernel.fitted.values() for cell in number.fitted_to)
-        assert {column for _, column in kernel.fitted} <= {"chain_alu", "chain_atomic"}
+        assert all("Figure 5" in source or "Table 2" in source or source.startswith("as ") for source in sources)
+        for (event, column), number in kernel.fitted.items():
+            several = (event, column) == ("ROP_STEPS", "int32") and name.endswith("msaa")
+            assert column == "chain_alu" or several
+            assert all(("laine2011-table2" if several else "laine2011-figure5") in cell for cell in number.fitted_to)
 
 
-def test_nothing_of_freepipe_is_fitted():
-    for kernel in load_mix("freepipe", "2.0").kernels.values():
-        assert {kind for kind, _ in kernel.provenance.values()} == {"derived"}
+def test_of_several_samples_one_cell_was_fitted_to():
+    numbers = [number for kernel in load_mix("cudaraster", "2.0").kernels.values() for number in kernel.fitted.values()]
+    targets = {cell for number in numbers for cell in number.fitted_to}
+    named = [
+        c for c in table2_cells() if any(names_cell(t, (c.frame, "laine2011-table2", c.row, c.column)) for t in targets)
+    ]
+    assert [(cell.row, cell.column) for cell in named] == [("FairyForest, Depth, no blend", "8 samples")]
+
+
+def test_one_number_of_freepipe_is_fitted_to_buddha_at_the_smallest_size():
+    numbers = load_mix("freepipe", "2.0").kernels["freepipe"].fitted
+    assert list(numbers) == [("SETUP_STEPS", "fp32")]
+    targets = numbers["SETUP_STEPS", "fp32"].fitted_to
+    assert targets == ("buddha (generated) 512x384 | laine2011-slides | buddha 512x384 | freepipe",)
+
+
+@pytest.mark.parametrize("scene", ["sanmiguel", "juarez", "stalker", "city", "buddha"])
+def test_the_exponent_of_a_scene_was_fitted_to_one_size(scene):
+    ours = dict.fromkeys(generated.PIPELINES, 1.0)
+    cells = [cell for size in generated.SIZES for cell in slides.time_cells(scene, size, ours, ours)]
+    targets = generated.EXPONENTS[scene].fitted_to
+    named = [c for c in cells if any(names_cell(t, (c.frame, "laine2011-slides", c.row, c.column)) for t in targets)]
+    assert [cell.column for cell in named] == ["freepipe"]
 
 
 def test_nothing_of_the_gtx_680_is_fitted_or_measured():
@@ -108,25 +135,95 @@ def test_every_counter_of_the_authors_profiler_is_compared():
     assert len(cells) == 4 + 6 + 33
 
 
-def test_generated_areas_have_their_mean():
-    areas = generated._areas(np.random.default_rng(1), GENERATED)
-    assert areas.mean() == pytest.approx(GENERATED.pixels)
+@pytest.mark.parametrize("exponent", [0.85, 1.2, 3.0])
+def test_generated_areas_have_their_mean_on_the_screen(exponent):
+    areas = pareto_areas(100_000, PIXELS, exponent)
+    screen = 1024 * 768
+    assert np.mean(areas * screen / (areas + screen)) == pytest.approx(PIXELS, rel=1e-6)
 
 
-def test_a_generated_scene_has_its_visible_share():
-    counts = simulate(generated.generate(GENERATED), "cudaraster", "gtx480", width=1024, height=768).counts
-    away = counts["triangle_setup.BACKFACE_CULLED"] / GENERATED.triangles
-    assert 1.0 - away == pytest.approx(GENERATED.visible / 100, abs=0.03)
+def test_areas_fall_by_their_exponent():
+    areas = pareto_areas(100_000, PIXELS, 1.5)
+    assert np.count_nonzero(areas > 100.0) / np.count_nonzero(areas > 1000.0) == pytest.approx(10**1.5, rel=0.02)
+
+
+def test_a_smaller_exponent_makes_the_largest_triangle_larger():
+    largest = [pareto_areas(100_000, PIXELS, exponent)[0] for exponent in (3.0, 1.5, 1.0)]
+    assert largest == sorted(set(largest))
+
+
+def test_a_generated_scene_has_its_visible_share_and_pixels():
+    run = simulate(SMALL, "cudaraster", "gtx480", width=1024, height=768)
+    counts, counters = run.counts, run.frame.facts["counters"]
+    away, outside = counts["triangle_setup.BACKFACE_CULLED"], counts["triangle_setup.VIEWPORT_CULLED"]
+    assert (away, outside) == ((TRIANGLES - VISIBLE) / 2, (TRIANGLES - VISIBLE) / 2)
+    survivors = VISIBLE - counters["TriangleSetup / Between pixels cull"] * TRIANGLES / 100
+    samples = counters["TriangleSetup / Avg. samples / tri"] * survivors / VISIBLE
+    assert samples == pytest.approx(PIXELS, rel=0.15)
 
 
 def test_generated_triangles_come_in_the_order_of_their_places():
-    x = generated.generate(GENERATED).mesh.positions[::3, 0]
-    assert np.abs(np.diff(x)).mean() < 0.3
+    x = SMALL.mesh.positions[::3, 0]
+    assert np.abs(np.diff(x[np.abs(x) <= 2])).mean() < 0.3
+
+
+def test_an_ellipse_is_filled_evenly():
+    ellipse = Places((0.6, 1.0), ellipse=True, disorder=0.0)
+    corners = heavy_tail_scene("disc", TRIANGLES, TRIANGLES, 0.01, 9.0, ellipse).mesh.positions
+    radius = np.hypot(corners[:, 0] / 0.6, corners[:, 1])
+    assert radius.max() < 1.01
+    assert np.mean(radius < np.sqrt(0.5)) == pytest.approx(0.5, abs=0.02)
+
+
+def test_fairyforest_is_as_the_log_counts_it():
+    fairy = generated.fairy()
+    assert fairy.visible == pytest.approx(100 - 46.2 - 24.4)
+    assert fairy.pixels * fairy.visible == pytest.approx(49.92 * (100 - 46.2 - 24.4 - 6.7))
+
+
+def table2_cells():
+    return [
+        Cell(f"{scene}, {mode}", f"{samples} samples", "ms", published=1.0, ours=1.0, frame=generated.frame_name(name))
+        for scene, name in table2.SCENES.items()
+        for mode in table2.MODES
+        for samples in table2.SAMPLES
+    ]
+
+
+def test_table_2_is_complete(monkeypatch):
+    run = simulate(QUAD, "cudaraster", "gtx480", width=64, height=48)
+    monkeypatch.setenv(generated.VARIABLE, "all")
+    monkeypatch.setattr(table2, "draw", lambda *_, **__: run)
+    cells = table2.run(str).cells
+    assert len(cells) == 2 * 3 * 4 + 1
+    log = published(sweep.__file__, "gtx480-cuda40")
+    rows = log[(log["table"] == "table2") & (log["renderer"] == "CudaRaster")]
+    assert sorted(cell.published for cell in cells if cell.unit == "ms") == sorted(rows["value"])
+
+
+@pytest.mark.parametrize("mode", ["depth", "blend", "depth-only"])
+def test_fine_raster_pays_for_every_sample(mode):
+    made = [
+        simulate(SMALL, "cudaraster", "gtx480", width=256, height=192, mode=mode, msaa=samples, picture=False)
+        for samples in (1, 2, 4, 8)
+    ]
+    fine = [run.stages.loc["fine_raster", "instructions"] for run in made]
+    assert fine == sorted(set(fine))
+    assert (fine[3] - fine[2]) / (fine[2] - fine[1]) == pytest.approx(2.0, rel=0.2)  # as many more samples
+
+
+def test_draws_of_tiles_wait_at_one_address():
+    run = simulate(QUAD, "cudaraster", "gtx480", width=1024, height=768, picture=False)
+    machine = load_machine("gtx480")
+    draws = run.counts["fine_raster.ATOMIC"]
+    assert draws > 12288
+    waited = draws * machine.atomics.unit_ns_per_request * 1e-6
+    assert run.stages.loc["fine_raster", "queue_ms"] == pytest.approx(waited)
 
 
 def test_ratios_are_those_of_the_slides():
     asked = slides.published_ms("city", 1024, 768)
-    cells = {cell.column: cell for cell in slides.time_cells("", asked, asked)}
+    cells = {cell.column: cell for cell in slides.time_cells("city", (1024, 768), asked, asked)}
     assert cells["SW:HW"].ours == pytest.approx(3.01, abs=0.005)
     assert cells["FP:SW"].ours == pytest.approx(80.54, rel=0.01)
 

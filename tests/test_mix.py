@@ -11,6 +11,7 @@ from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Stream
 from tilestamp.models.machine import load_machine
 from tilestamp.models.traffic import traffic
+from tilestamp.simulator import mix as mix_module
 from tilestamp.simulator.mix import MIXES, PROVENANCES, KernelMix, Mix, load_mix
 from tilestamp.simulator.work import Work
 
@@ -101,6 +102,41 @@ def test_a_variant_with_a_table_of_its_own_takes_that():
     work = {"stage": "s", "kernel": "k", "events": Event, "table": np.zeros((1, 3), np.int64), "grid": 1, "block": 32}
     registers = [mix.launch(Work(**work, variant=variant), 32).registers for variant in ("", "tile 8", "tile 4")]
     assert registers == [10, 20, 10]
+
+
+LIKE = """
+[k]
+registers = 10
+provenance = "derived"
+source = "here"
+STEPS = { fp32 = 3 }
+LOADS = { load = 1 }
+["k: fast"]
+like = "k"
+LOADS = {}
+"""
+
+
+def write_mix(folder, text):
+    (folder / "p").mkdir()
+    (folder / "p" / "cc1.toml").write_text(text, "utf-8")
+
+
+def test_a_table_like_another_has_what_it_does_not_say(tmp_path, monkeypatch):
+    write_mix(tmp_path, LIKE)
+    monkeypatch.setattr(mix_module, "MIXES", tmp_path)
+    load_mix.cache_clear()
+    fast = load_mix("p", "1.0").kernels["k: fast"]
+    load_mix.cache_clear()
+    assert (fast.registers, fast.prices) == (10, {"STEPS": {"fp32": 3}, "LOADS": {}})
+    assert fast.provenance["STEPS"] == ("derived", "here")
+
+
+def test_a_table_like_one_that_is_not_there_is_refused(tmp_path, monkeypatch):
+    write_mix(tmp_path, LIKE.replace('like = "k"', 'like = "ghost"'))
+    monkeypatch.setattr(mix_module, "MIXES", tmp_path)
+    with pytest.raises(TilestampError, match="like ghost"):
+        load_mix("p", "1.0")
 
 
 def test_an_event_of_instructions_that_passes_through_is_one_instruction_of_its_lanes():

@@ -19,7 +19,7 @@ WARPS = 20  # a block
 TABLE_BYTES = 6144  # edge coverage, shared
 WARP_BYTES = {1: 2112, 2: 1856, 4: 1856, 8: 1856}
 START_LOADS = 3  # of a warp that starts: whether a buffer was too small
-DRAW_REQUESTS = 2  # of a warp that draws a tile, to one sector: the counter, and beside it the number of tiles
+DRAW_REQUESTS = {"1.1": 1, "nvdiffrast": 2}  # of a draw, to one sector: the counter; and the number of tiles beside it
 SAMPLE_SECONDS, ENTRY_SECONDS = 50e-9, 1e-6  # CPU time of a sample, and of an entry of a tile's list
 
 
@@ -63,9 +63,7 @@ def fine_work(
     """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``."""
     table = _with_starts(rows, WARPS * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
     shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
-    queue = None
-    if release == "nvdiffrast":  # a mix for 1.1 has this wait in the chain of a draw
-        queue = np.array([DRAW_REQUESTS * table[:, FineRasterEvent.ATOMIC].sum()])
+    queue = np.array([DRAW_REQUESTS[release] * table[:, FineRasterEvent.ATOMIC].sum()])
     return Work(
         stage="fine_raster",
         kernel="fineRaster",

@@ -1,0 +1,104 @@
+"""Table 2: samples a pixel in three modes, FairyForest and Buddha, GTX 480 (Laine & Karras 2011)."""
+
+from typing import TYPE_CHECKING
+
+from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, everything, frame_name, warning
+from tilestamp.experiments.laine2011.sweep import HEIGHT, SOURCE, WIDTH
+from tilestamp.reports.plots import paired_bars
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+SLOW = True  # several frames of a million triangles
+
+SCENES = {"FairyForest": FAIRY, "Buddha": "buddha"}
+MODES = {"Depth, no blend": "depth", "No depth, alpha blend": "blend", "Depth only": "depth-only"}
+SAMPLES = (1, 2, 4, 8)
+AIM = 0.2
+EMITS = "CoarseRaster / Emits / Triangle"
+
+
+def run(progress: Progress) -> Result:
+    """Draw generated scenes with 1, 2, 4 and 8 samples."""
+    cells: list[Cell] = []
+    for scene, name in SCENES.items():
+        for label in modes():
+            progress(f"laine2011/table2: {scene}, {label}")
+            cells += [time_cell(scene, name, label, samples) for samples in SAMPLES]
+    cells.append(emits_cell())
+    return Result(
+        name="laine2011-table2",
+        title="Table 2: samples a pixel, CudaRaster, 1024x768, GTX 480",
+        source=SOURCE,
+        cells=cells,
+        figures=[CellFigure("samples", _draw)],
+        notes=[
+            (
+                "One number of all that several samples cost is fitted, on one cell: FairyForest, depth, no blend, 8 "
+                "samples. The rest of their mix is operations counted by hand."
+            ),
+            f"{len(modes())} of {len(MODES)} modes were drawn; {VARIABLE}=all draws all.",
+        ],
+        warnings=[warning()],
+    )
+
+
+def modes() -> list[str]:
+    """Modes to draw."""
+    return list(MODES) if everything() else list(MODES)[:1]
+
+
+def time_cell(scene: str, name: str, label: str, samples: int) -> Cell:
+    """Time of a frame."""
+    log = published(__file__, "gtx480-cuda40")
+    rows = log[(log["table"] == "table2") & (log["renderer"] == "CudaRaster") & (log["scene"] == scene)]
+    asked = rows.loc[(rows["key"] == label) & (rows["column"] == f"msaa{samples}_ms"), "value"]
+    made = draw(name, "cudaraster", WIDTH, HEIGHT, mode=MODES[label], msaa=samples)
+    return Cell(
+        f"{scene}, {label}",
+        f"{samples} samples",
+        "ms",
+        published=float(asked.iloc[0]),
+        ours=made.milliseconds,
+        aim=AIM,
+        frame=frame_name(name),
+    )
+
+
+def emits_cell() -> Cell:
+    """Tiles of a triangle of the generated FairyForest: what the exponent of its areas was chosen on."""
+    log = published(__file__, "gtx480-cuda40")
+    rows = log[(log["table"] == "table3") & (log["scene"] == "FairyForest") & (log["key"] == EMITS)]
+    ours = draw(FAIRY, "cudaraster", WIDTH, HEIGHT, mode="depth", msaa=1).frame.facts["counters"][EMITS]
+    return Cell(
+        "FairyForest",
+        "tiles a triangle",
+        "",
+        published=float(rows["value"].iloc[0]),
+        ours=ours,
+        frame=frame_name(FAIRY),
+    )
+
+
+def _draw(cells: "Sequence[Cell]", path: "Path") -> None:
+    import pandas as pd
+
+    rows = [
+        {"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status}
+        for c in cells
+        if c.unit == "ms"
+    ]
+    paired_bars(
+        pd.DataFrame(rows),
+        path,
+        label="cell",
+        ours="ms",
+        published="published",
+        status="status",
+        title="Samples a pixel, generated scenes, GTX 480 (published: on the real ones)",
+        y_label="time of a frame [ms]",
+    )
