@@ -8,7 +8,7 @@ the models may be copied. Without it the experiments that need it say so.
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +109,7 @@ def _values(table: "pd.DataFrame") -> dict[tuple[str, str, int, str], float]:
     return {(str(c), str(k), int(i), str(m)): float(v) for (c, k, i, m), v in means.items()}
 
 
-def _mesh(stored: Any) -> Mesh:
+def _mesh(stored: "np.lib.npyio.NpzFile") -> Mesh:
     """Arrays of an input as a mesh."""
     textures = tuple(stored[key] for key in sorted(stored.files) if key.startswith("texture") and key != "texture_ids")
     return Mesh(
