@@ -62,9 +62,10 @@ class Result(IntEnum):
     BOUND = 14  # place in ``HOLDS`` of what holds
     TAIL_CYCLES = 15  # from the start of the last unit to the end
     BUSY_SMS = 16  # that got a unit
+    HELD = 17  # units that such an SM holds, in the mean over the time in which units run
 
 
-COLUMNS = Result.BUSY_SMS + 1  # of terms and results
+COLUMNS = Result.HELD + 1  # of terms and results
 
 
 class Fact(IntEnum):

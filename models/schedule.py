@@ -99,6 +99,8 @@ class Played(NamedTuple):
         What a unit takes by itself, in the mean.
     served : float
         What an SM serves in all, in the mean.
+    held : float
+        What all units together take, with their neighbours in the way.
     """
 
     low: float
@@ -107,6 +109,7 @@ class Played(NamedTuple):
     started: float
     own: float
     served: float
+    held: float
 
 
 @kernel
@@ -163,8 +166,10 @@ def play(units: Loads) -> Played:
     if more and own / units.sms < end + waited:
         lonely, lonely_started = _ends(units, units.alone, units.sms)
         started = lonely_started if lonely < end else started
-        return Played(min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served)
-    return Played(end - waited, end, end + waited, started, mean, served)
+        return Played(
+            min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, own
+        )
+    return Played(end - waited, end, end + waited, started, mean, served, own + more)
 
 
 @kernel
@@ -204,7 +209,12 @@ def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, r
     row[Result.LOW] = before + max(least, together(units, played, units.begun + played.low, 0.0))
     row[Result.HIGH] = before + max(least, together(units, played, units.begun + played.high, 1.0))
     row[Result.TAIL_CYCLES] = max(0.0, cycles - units.begun - played.started)
-    row[Result.BUSY_SMS] = min(len(units.sm), units.sms)
+    busy = min(len(units.sm), units.sms)
+    row[Result.BUSY_SMS] = busy
+    if len(units.draws):  # by blocks that stay until all is drawn
+        row[Result.HELD] = units.places / units.sms
+    elif played.end:
+        row[Result.HELD] = played.held / (busy * played.end)
     row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], some_idle)
 
 
