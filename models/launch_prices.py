@@ -74,7 +74,7 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
     units = Demand(table[0], table[1], table[2], table[3], table[4], table[5])
     sm, own, alone = np.empty(count), np.empty(count), np.empty(count)
     seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
-    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
         matrix = rates(launch, machine, moved_of(fact), totals)
