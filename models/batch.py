@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.atomic_units import dealing_of, fullest_requests
+from tilestamp.models.atomic_units import dealing_of, fullest_unit_ns
 from tilestamp.models.bounds import Fact
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import launch_prices
@@ -75,11 +75,11 @@ class Batch:
         facts = np.empty((len(self.machines), len(Fact)))
         held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
         facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
-        facts[:, Fact.DRAM_BYTES : Fact.WRITTEN_BYTES + 1] = moved
-        facts[:, Fact.FULLEST_REQUESTS] = 0.0
+        facts[:, Fact.DRAM_BYTES : Fact.FROM_L1 + 1] = moved
+        facts[:, Fact.FULLEST_NS] = 0.0
         if launch.atomic_requests is not None:
-            fullest = [fullest_requests(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
-            facts[:, Fact.FULLEST_REQUESTS] = self._dealing.each(fullest)
+            fullest = [fullest_unit_ns(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
+            facts[:, Fact.FULLEST_NS] = self._dealing.each(fullest)
         return facts
 
 

@@ -6,9 +6,9 @@ shared    passes through shared memory, all SMs equally busy
 l1        bytes between registers and the memory system, all SMs equally busy
 balance   where the blocks are fewer than the SMs: the fullest of issue, shared and l1 on the SMs that get any
 latency   Little's law: dependent chains of all units / units that are resident together
-dram, l2  bytes / bandwidth; stores may be slower than loads
+dram, l2  bytes / bandwidth, and in L2 lines moved in part; stores may be slower than loads
 atomic    requests and conflicts / rate of all atomic units
-queue     requests at the fullest atomic unit: contention. Where atomics lock DRAM, a request that waits for its lock
+queue     time of the fullest atomic unit: contention. Where atomics lock DRAM, a request that waits for its lock
           holds up those behind it, so that the queue adds to ``atomic``; L2 units wait side by side with the rest
 start     blocks / block launch rate
 launch    overhead of the kernel
@@ -29,6 +29,7 @@ from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
 from tilestamp.models.numbers import Number as M
+from tilestamp.models.traffic import Traffic
 
 
 class Term(IntEnum):
@@ -61,9 +62,10 @@ class Result(IntEnum):
     BOUND = 14  # place in ``HOLDS`` of what holds
     TAIL_CYCLES = 15  # from the start of the last unit to the end
     BUSY_SMS = 16  # that got a unit
+    HELD = 17  # units that such an SM holds, in the mean over the time in which units run
 
 
-COLUMNS = Result.BUSY_SMS + 1  # of terms and results
+COLUMNS = Result.HELD + 1  # of terms and results
 
 
 class Fact(IntEnum):
@@ -74,7 +76,24 @@ class Fact(IntEnum):
     L2_BYTES = 2
     LOAD_MISS = 3
     WRITTEN_BYTES = 4
-    FULLEST_REQUESTS = 5  # of atomics, at the unit that gets most
+    READ_LINES = 5
+    WRITTEN_LINES = 6
+    FROM_L1 = 7
+    FULLEST_NS = 8  # that the atomic unit with the most to do is busy
+
+
+@kernel
+def moved_of(facts: Any) -> Traffic:
+    """Bytes of a launch, from its facts."""
+    return Traffic(
+        facts[Fact.DRAM_BYTES],
+        facts[Fact.L2_BYTES],
+        facts[Fact.LOAD_MISS],
+        facts[Fact.WRITTEN_BYTES],
+        facts[Fact.READ_LINES],
+        facts[Fact.WRITTEN_LINES],
+        facts[Fact.FROM_L1],
+    )
 
 
 @kernel
@@ -124,7 +143,13 @@ def _chip_terms(terms: Any, totals: Any, machine: Any, facts: Any) -> None:
         read, written = machine[M.MEMORY_L2_BYTES_PER_CLOCK], facts[Fact.WRITTEN_BYTES]
         stores = written / (machine[M.MEMORY_L2_WRITE_BYTES_PER_CLOCK] or read)
         terms[Term.L2] = (facts[Fact.L2_BYTES] - written) / read + stores
-    terms[Term.QUEUE] = facts[Fact.FULLEST_REQUESTS] * machine[M.ATOMICS_UNIT_NS_PER_REQUEST] * clock_hz * 1e-9
+        for lines, rate in (
+            (Fact.READ_LINES, M.MEMORY_L2_READ_LINES_PER_CLOCK),
+            (Fact.WRITTEN_LINES, M.MEMORY_L2_WRITE_LINES_PER_CLOCK),
+        ):
+            if machine[rate]:
+                terms[Term.L2] += facts[lines] / machine[rate]
+    terms[Term.QUEUE] = facts[Fact.FULLEST_NS] * clock_hz * 1e-9
     rate = atomic_rate(totals, machine[M.ATOMICS_REQUESTS_PER_CLOCK], machine[M.ATOMICS_UNAWAITED_PER_CLOCK])
     conflicts = totals[E.ATOMIC_CONFLICTS] * machine[M.ATOMICS_CONFLICT_NS] * clock_hz * 1e-9
     terms[Term.ATOMIC] = totals[E.ATOMIC_REQUESTS] / rate + conflicts

@@ -73,6 +73,13 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
 
 
 @kernel
+def touched_lines(addresses: Any, lanes: int) -> int:
+    """Distinct lines of 128 bytes of one memory instruction; parameters as of ``transactions``."""
+    count: int = _segments(addresses, 0, lanes, WORD_BYTES, SEGMENT_BYTES, False)[0]
+    return count
+
+
+@kernel
 def _segments(
     addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
 ) -> tuple[int, int]:

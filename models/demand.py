@@ -8,8 +8,9 @@ shared      the shared memory of its SM: passes x cycles, replays included
 l1          the load/store path of its SM: bytes of its transactions, and the requests of atomics in L2 units, of which
             an SM sends its share of what all SMs together were measured to send
 
-and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, or its own instructions when
-its warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
+and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, of a lone warp, and what that
+warp waits for others of its block on the same scheduler (half of what both want); or its own instructions when its
+warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
 
 All but a few maxima are sums of machine events times cycles: ``rates`` makes the matrix, and ``demands`` sees of a
 machine nothing else, so that two machines with the same matrix have the same demands.
@@ -29,10 +30,13 @@ from tilestamp.models.machine import Machine
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.numbers import numbers_of
 from tilestamp.models.sums import TOGETHER, sum_up
+from tilestamp.models.traffic import Traffic
 
 Cycles = NDArray[np.float64]
 CLASSES = len(INSTRUCTION_CLASSES)
-SUMS = 11  # rows of the matrix of rates
+IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often as the other
+SUMS = 9  # rows of the matrix of rates
+UNKNOWN = Traffic(0.0, 0.0, 1.0)  # of a launch whose buffers nobody named: every load waits for DRAM
 
 
 class Sum(IntEnum):
@@ -44,11 +48,9 @@ class Sum(IntEnum):
     PIPE_MUL32 = 3
     PIPE_SFU = 4
     SHARED = 5  # cycles of shared memory
-    L1 = 6  # cycles of the load and store path, without stores
+    L1 = 6  # cycles of the load and store path
     CHAIN = 7  # cycles of round trips, one after another
-    STORED = 8  # bytes
-    SCATTERED = 9  # bytes of the transactions stored: those beyond went to local memory
-    OTHERS = 10  # no sum: ``Other``
+    OTHERS = 8  # no sum: ``Other``
 
 
 class Other(IntEnum):
@@ -56,8 +58,7 @@ class Other(IntEnum):
 
     START = 0  # cycles that a block waits for its own start
     SPREAD = 1  # schedulers / those that a unit's warps can use
-    SCATTERED = 2  # cycles of the load and store path for a byte stored
-    LOCAL = 3  # the same, in local memory
+    BESIDE = 2  # share of its issue that the warp of a block's chain waits for others on its scheduler
 
 
 class Demand(NamedTuple):
@@ -69,6 +70,8 @@ class Demand(NamedTuple):
         On the unit's own SM.
     chain : ndarray
         Round trips that the unit waits for, one after another.
+    scheduler : ndarray
+        Of the schedulers that the unit has a warp on.
     alone : ndarray
         What the unit takes with the machine to itself.
     """
@@ -77,6 +80,7 @@ class Demand(NamedTuple):
     shared: Cycles
     l1: Cycles
     chain: Cycles
+    scheduler: Cycles
     alone: Cycles
 
 
@@ -98,31 +102,31 @@ class Whole(NamedTuple):
     way: float
 
 
-def demand(launch: Launch, machine: Machine, load_miss: float) -> Demand:
+def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     """Cycles that each unit of a launch asks for.
 
     Parameters
     ----------
     launch : Launch
     machine : Machine
-    load_miss : float
-        Share of the bytes loaded that come from DRAM.
+    moved : Traffic
+        Its bytes.
     """
-    matrix = rates(launch.shape, numbers_of([machine])[0], float(load_miss), launch.totals)
+    matrix = rates(launch.shape, numbers_of([machine])[0], Traffic(*map(float, moved)), launch.totals)
     found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
     demands(launch.columns, matrix, found)
     return found
 
 
 @kernel
-def rates(launch: Shape, machine: Any, load_miss: float, totals: Any) -> Any:
+def rates(launch: Shape, machine: Any, moved: Traffic, totals: Any) -> Any:
     """Cycles of each machine event, (SUMS, EVENTS): 0 where the launch has none of it.
 
     Parameters
     ----------
     launch : Shape
     machine : ndarray, (len(Number),)
-    load_miss : float
+    moved : Traffic
     totals : ndarray, (EVENTS,)
         Events of all units.
     """
@@ -132,16 +136,14 @@ def rates(launch: Shape, machine: Any, load_miss: float, totals: Any) -> Any:
     groups = machine[M.SM_WARP_SIZE] / machine[M.MEMORY_BANK_LANES]
     matrix[Sum.SHARED, E.SHARED] = matrix[Sum.SHARED, E.SHARED_ATOMIC] = groups * passes
     matrix[Sum.SHARED, E.BANK_REPLAYS] = passes
-    matrix[Sum.L1, E.LOAD_BYTES] = 1.0 / machine[M.MEMORY_L1_BYTES_PER_CLOCK]
+    _l1_rates(matrix[Sum.L1], machine, moved, totals)
     awaited = machine[M.ATOMICS_SM_REQUESTS_PER_CLOCK] or machine[M.ATOMICS_REQUESTS_PER_CLOCK]
     matrix[Sum.L1, E.ATOMIC_REQUESTS] = 1.0 / atomic_rate(totals, awaited, machine[M.ATOMICS_SM_UNAWAITED_PER_CLOCK])
-    _chain_rates(matrix, machine, load_miss)
-    matrix[Sum.STORED, E.STORE_BYTES] = 1.0
-    matrix[Sum.SCATTERED, E.STORE_TRANSACTIONS] = machine[M.MEMORY_L2_LINE_BYTES]
+    _chain_rates(matrix, machine, moved)
     for column in range(EVENTS):
         if totals[column] == 0:
             matrix[:, column] = 0.0
-    _other_rates(matrix[Sum.OTHERS], launch, machine, totals[E.STORE_BYTES] > 0)
+    _other_rates(matrix[Sum.OTHERS], launch, machine)
     return matrix
 
 
@@ -159,28 +161,38 @@ def _issue_rates(matrix: Any, machine: Any) -> None:
 
 
 @kernel
-def _chain_rates(matrix: Any, machine: Any, load_miss: float) -> None:
-    """Cycles of the dependent round trips; a load that misses waits for DRAM."""
+def _l1_rates(l1: Any, machine: Any, moved: Traffic, totals: Any) -> None:
+    """SM cycles of a byte: stores may be slower than loads, and lines moved in part come on top."""
+    lines = machine[M.MEMORY_L1_LINE_CYCLES]
+    l1[E.LOAD_BYTES] = 1.0 / machine[M.MEMORY_L1_BYTES_PER_CLOCK]
+    l1[E.STORE_BYTES] = 1.0 / (machine[M.MEMORY_L1_WRITE_BYTES_PER_CLOCK] or machine[M.MEMORY_L1_BYTES_PER_CLOCK])
+    l1[E.LOAD_BYTES] += lines * moved.read_lines / max(1.0, totals[E.LOAD_BYTES])
+    l1[E.STORE_BYTES] += lines * moved.written_lines / max(1.0, moved.written_bytes)
+
+
+@kernel
+def _chain_rates(matrix: Any, machine: Any, moved: Traffic) -> None:
+    """Cycles of the dependent round trips; a load waits for where its data lies."""
     far = machine[M.LATENCY_DRAM_CYCLES]
     near = machine[M.LATENCY_L2_CYCLES] if machine[M.MEMORY_L2_BYTES] else far
     matrix[Sum.CHAIN, E.CHAIN_ALU] = machine[M.LATENCY_ALU_CYCLES]
     matrix[Sum.CHAIN, E.CHAIN_SHARED] = machine[M.LATENCY_SHARED_CYCLES]
-    matrix[Sum.CHAIN, E.CHAIN_LOAD] = near + (far - near) * min(1.0, load_miss)
+    beyond = near + (far - near) * min(1.0, moved.load_miss)
+    l1 = machine[M.LATENCY_L1_CYCLES] or near
+    matrix[Sum.CHAIN, E.CHAIN_LOAD] = moved.from_l1 * l1 + (1.0 - moved.from_l1) * beyond
     matrix[Sum.CHAIN, E.CHAIN_ATOMIC] = machine[M.LATENCY_ATOMIC_CYCLES]
     matrix[Sum.CHAIN, E.CHAIN_BARRIER] = machine[M.LATENCY_BARRIER_CYCLES]
 
 
 @kernel
-def _other_rates(others: Any, launch: Shape, machine: Any, stores: bool) -> None:
-    """Rates that are of no event; stores may be slower than loads, those to local memory less so."""
+def _other_rates(others: Any, launch: Shape, machine: Any) -> None:
+    """Rates that are of no event."""
     schedulers = machine[M.SM_SCHEDULERS]
     warps = -(-launch.block // machine[M.SM_WARP_SIZE]) if launch.block_is_unit else 1.0
     others[Other.START] = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
     others[Other.SPREAD] = schedulers / min(schedulers, warps)
-    if stores:
-        write = machine[M.MEMORY_L1_WRITE_BYTES_PER_CLOCK] or machine[M.MEMORY_L1_BYTES_PER_CLOCK]
-        others[Other.SCATTERED] = 1.0 / write
-        others[Other.LOCAL] = 1.0 / (machine[M.MEMORY_L1_LOCAL_BYTES_PER_CLOCK] or write)
+    if warps > schedulers:
+        others[Other.BESIDE] = IN_THE_WAY * min(1.0, warps / schedulers - 1.0) * schedulers / warps
 
 
 @kernel
@@ -212,11 +224,10 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
             row, unit = sums[:, i], first + i
             pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
             issue = max(row[Sum.DISPATCH], pipe)
-            scattered = min(row[Sum.STORED], row[Sum.SCATTERED])
-            stored = scattered * others[Other.SCATTERED] + (row[Sum.STORED] - scattered) * others[Other.LOCAL]
-            shared, l1, chain = row[Sum.SHARED], row[Sum.L1] + stored, row[Sum.CHAIN] + others[Other.START]
+            shared, l1, chain = row[Sum.SHARED], row[Sum.L1], row[Sum.CHAIN] + others[Other.START]
             found.issue[unit], found.shared[unit], found.l1[unit], found.chain[unit] = issue, shared, l1, chain
-            found.alone[unit] = max(chain, issue * others[Other.SPREAD])
+            found.scheduler[unit] = issue * others[Other.SPREAD]
+            found.alone[unit] = max(chain + issue * others[Other.BESIDE], found.scheduler[unit])
             issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
             way = min(way, chain)
     return Whole(issues, shareds, l1s, chains, way)

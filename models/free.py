@@ -19,11 +19,12 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from tilestamp.models.bounds import COLUMNS, HOLDS, Result, Term, bound_launch, longest
+from tilestamp.models.demand import IN_THE_WAY
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import Opened
 from tilestamp.models.machine import Machine
 from tilestamp.models.price import opened
-from tilestamp.models.schedule import IN_THE_WAY, Loads, crowd, holds, play, schedule_launch, together
+from tilestamp.models.schedule import Loads, crowd, holds, play, schedule_launch, together
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import traffic
 
@@ -31,9 +32,16 @@ MACHINE_TERMS = ("issue", "shared", "l1", "latency", "dram", "l2", "atomics", "s
 SCHEDULE_TERMS = ("balance", "tail")
 _Numbers = dict[str, dict[str, tuple[str, ...]]]  # by term and section
 _RATES: _Numbers = {
-    "l1": {"memory": ("l1_bytes_per_clock", "l1_write_bytes_per_clock", "l1_local_bytes_per_clock")},
+    "l1": {"memory": ("l1_bytes_per_clock", "l1_write_bytes_per_clock")},
     "dram": {"memory": ("dram_gb_per_s",)},
-    "l2": {"memory": ("l2_bytes_per_clock", "l2_write_bytes_per_clock")},
+    "l2": {
+        "memory": (
+            "l2_bytes_per_clock",
+            "l2_write_bytes_per_clock",
+            "l2_read_lines_per_clock",
+            "l2_write_lines_per_clock",
+        )
+    },
     "atomics": {
         "atomics": ("requests_per_clock", "unawaited_per_clock", "sm_requests_per_clock", "sm_unawaited_per_clock")
     },
@@ -42,8 +50,9 @@ _RATES: _Numbers = {
 _COSTS: _Numbers = {
     "issue": {"issue": (), "pipe": ()},  # all of the section
     "shared": {"memory": ("bank_pass_cycles",)},
+    "l1": {"memory": ("l1_line_cycles",)},
     "latency": {"latency": ()},
-    "atomics": {"atomics": ("unit_ns_per_request", "conflict_ns")},
+    "atomics": {"atomics": ("unit_ns_per_request", "spread_ns_per_request", "conflict_ns")},
     "launch": {"launch": ("kernel_us",)},
 }
 
@@ -91,7 +100,7 @@ def _balanced(whole: Opened, timing: Timing, sms: int) -> Timing:
     units, terms, row = whole.loads, whole.terms.copy(), np.zeros(COLUMNS)
     share = min(len(units.alone), units.sms) / sms
     terms[Term.BALANCE], terms[Term.LATENCY] = 0.0, terms[Term.LATENCY] * share
-    units = units._replace(sm=units.sm * share, alone=units.alone * share, way=units.way * share)
+    units = units._replace(sm=units.sm * share, own=units.own * share, alone=units.alone * share, way=units.way * share)
     if timing.fidelity == "schedule":
         schedule_launch(units, play(units), terms, False, row)
     else:

@@ -8,6 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+SECTOR_BYTES, LINE_BYTES = 32, 128
+
 
 @dataclass(frozen=True)
 class Stream:
@@ -28,6 +30,10 @@ class Stream:
     requested_bytes : int
         Of a buffer that units read again: bytes that all units together ask for, each segment once a unit. Where L1
         keeps what an SM loaded, more than ``bytes`` of them come from L2, as other SMs hold them. 0: ``bytes``.
+    partial_lines : int or None
+        Lines of 128 bytes that its requests touch in part, counted once a request: each costs more than its bytes. Of
+        ``requested_bytes``, where those are given.
+        None: not counted; then loads fill their lines, and of stores each sector of 32 bytes lies in a line of its own.
     """
 
     buffer: str
@@ -36,6 +42,14 @@ class Stream:
     footprint_bytes: int
     span_bytes: int = 0
     requested_bytes: int = 0
+    partial_lines: int | None = None
+
+    @property
+    def lines_in_part(self) -> float:
+        """Lines that are moved in part."""
+        if self.partial_lines is None:
+            return self.bytes / SECTOR_BYTES if self.op == "store" else 0.0
+        return float(self.partial_lines)
 
 
 class Shape(NamedTuple):

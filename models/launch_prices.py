@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, TAIL, Fact, Term, bound_launch, bound_terms
+from tilestamp.models.bounds import COLUMNS, TAIL, Term, bound_launch, bound_terms, moved_of
 from tilestamp.models.demand import SUMS, Demand, Whole, demands, rates
 from tilestamp.models.events import EVENTS
 from tilestamp.models.events import MachineEvent as E
@@ -58,8 +58,8 @@ class Opened(NamedTuple):
 def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np.float64]) -> Opened:
     """What the price of one launch on one machine is made of; parameters as a row of those of ``launch_prices``."""
     found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
-    units = np.empty(len(launch.events)), np.empty(len(launch.events))
-    whole = demands(launch.columns, rates(launch.shape, machine, facts[Fact.LOAD_MISS], launch.totals), found)
+    units = np.empty(len(launch.events)), np.empty(len(launch.events)), np.empty(len(launch.events))
+    whole = demands(launch.columns, rates(launch.shape, machine, moved_of(facts), launch.totals), found)
     load_units(found, *units)
     terms = bound_terms(launch.shape, whole, launch.totals, machine, facts)
     loaded = loads(launch.shape, units, launch.columns[E.ATOMIC_REQUESTS], terms, whole.way, machine, facts)
@@ -70,21 +70,22 @@ def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np
 def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, scheduled: bool, prices: Any) -> None:
     """Fill in all rows; what units ask for, and how the SMs work them off, is made anew where it is another."""
     count = launch.units
-    units = Demand(np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count))
-    sm, alone = np.empty(count), np.empty(count)
+    table = np.empty((6, count))
+    units = Demand(table[0], table[1], table[2], table[3], table[4], table[5])
+    sm, own, alone = np.empty(count), np.empty(count), np.empty(count)
     seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
-    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
-        matrix = rates(launch, machine, fact[Fact.LOAD_MISS], totals)
+        matrix = rates(launch, machine, moved_of(fact), totals)
         if (matrix != seen).any():
             whole = demands(events, matrix, units)
-            load_units(units, sm, alone)
+            load_units(units, sm, own, alone)
             seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0)
         terms = bound_terms(launch, whole, totals, machine, fact)
         row[:TAIL] = terms
         if scheduled:
-            loaded = loads(launch, (sm, alone), events[E.ATOMIC_REQUESTS], terms, whole.way, machine, fact)
+            loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], terms, whole.way, machine, fact)
             queue = terms[Term.QUEUE] if launch.drawn else 0.0
             now = (float(loaded.places), float(loaded.sms), loaded.interval, loaded.start, queue)
             if now != settled:

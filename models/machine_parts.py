@@ -16,6 +16,7 @@ Size = Annotated[int, msgspec.Meta(ge=0, le=MOST_BYTES)]
 Positive = Annotated[float, msgspec.Meta(ge=1e-3, le=1e6)]
 Amount = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 Slot = Annotated[float, msgspec.Meta(ge=1 / 64, le=1e4)]  # cycles of an instruction
+Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
 Sms = Annotated[int, msgspec.Meta(ge=1, le=1 << 16)]
 
 
@@ -92,7 +93,7 @@ class Latency(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     atomic_cycles: Positive
     barrier_cycles: Amount
     block_launch_cycles: Amount  # from a free place on the SM to the first instruction of the block put there
-    l1_cycles: Amount = 0.0  # described, not priced: no stage counts which loads L1 answers; 0: not known
+    l1_cycles: Amount = 0.0  # of a load that L1 answers, from compute capability 7.0 on; 0: not known, as l2_cycles
     l2_far_cycles: Amount = 0.0  # described, not priced: data beyond the near part of L2; 0: not known
 
 
@@ -101,7 +102,7 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     coalescing: Literal["half_warp_segments", "warp_lines", "warp_sectors"]
     dram_gb_per_s: Positive
-    dram_efficiency: Annotated[float, msgspec.Meta(gt=0, le=1)]  # best sustained share of dram_gb_per_s
+    dram_efficiency: Share  # best sustained share of dram_gb_per_s
     l2_bytes: Size  # 0: no cache between the SMs and DRAM
     l2_line_bytes: Count
     l2_bytes_per_clock: Amount  # all SMs together
@@ -111,9 +112,12 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bank_pass_cycles: Positive  # one pass of one group of bank_lanes
     bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
     bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
+    l2_kept_share: Share = 1.0  # of l2_bytes, for data that all SMs use: halves keep copies of each other's
+    l2_read_lines_per_clock: Amount = 0.0  # lines fetched in part, which take this besides their bytes; 0: nothing
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
+    l2_write_lines_per_clock: Amount = 0.0  # as l2_read_lines_per_clock, for stores
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
-    l1_local_bytes_per_clock: Amount = 0.0  # as l1_write_bytes_per_clock, for local memory, in whole lines; 0: the same
+    l1_line_cycles: Amount = 0.0  # of one SM, for a line fetched or stored in part, besides its bytes
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -123,9 +127,10 @@ class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     merge: Literal["none", "sector"]
     unit_bytes: Count  # consecutive bytes that one lock or unit owns
     units: Size  # units that the addresses are dealt to; 0: each stretch of unit_bytes has its own
-    unit_ns_per_request: Amount  # for which the unit is held
+    unit_ns_per_request: Amount  # for which the unit is held, where one address is wanted again and again
     requests_per_clock: Positive  # all units together, at different addresses
     conflict_ns: Amount  # further time of the whole memory system for a lane that an earlier lane of its warp blocks
+    spread_ns_per_request: Amount = 0.0  # as unit_ns_per_request, at many addresses of the unit; 0: the same
     unawaited_per_clock: Amount = 0.0  # as requests_per_clock, where no value is returned; 0: the same
     sm_requests_per_clock: Amount = 0.0  # what one SM sends; 0: not known, as much as all units together take
     sm_unawaited_per_clock: Amount = 0.0  # as sm_requests_per_clock, where no value is returned; 0: the same

@@ -171,7 +171,14 @@ def _timing(launch: Launch | PipeLaunch, batch: Batch, moved: Sequence[Traffic],
         low=low / clock_hz * 1e3,
         high=high / clock_hz * 1e3,
         residency=_steps(launch, machine, held),
+        achieved=_achieved(launch, machine, row[Result.HELD], held) if fidelity == "schedule" else NAN,
     )
+
+
+def _achieved(launch: Launch, machine: Machine, units: float, held: Residency) -> float:
+    """Share of an SM's warps that are resident in the mean, where it holds so many units in the mean."""
+    warps = held.warps / held.blocks if launch.shape.block_is_unit else 1.0
+    return min(held.occupancy, units * warps / machine.sm.max_warps)
 
 
 def _untimed(launch: Launch | PipeLaunch, moved: Traffic, occupancy: float) -> Timing:

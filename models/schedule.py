@@ -4,10 +4,10 @@ The machine hands units to places in order: to the place that is free first, a b
 than the block launch rate allows. So while long blocks fill all places nothing starts, and that time is lost: empty
 blocks behind them have to be started one by one. A unit takes its place until three things are over:
 
-*Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want the SM at the
-same time for at most the smaller of its own work there and theirs, and of two that want the same each goes first as
-often as the other. So half of the smaller is waited for. Neighbours' work is that of all units, less the longest one of
-each SM, a share an SM.
+*Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want a scheduler, or
+the SM, at the same time for at most the smaller of its own work there and theirs, and of two that want the same each
+goes first as often as the other. So half of the smaller is waited for. Neighbours' work is that of all units, less the
+longest one of each SM, a share an SM.
 
 *Its SM.* Schedulers, execution units, shared memory and load path (the fullest) serve units in order, as many at a time
 as there are SMs. A block's first request comes a block start after it got its place.
@@ -35,14 +35,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
-from tilestamp.models.demand import Demand
+from tilestamp.models.demand import IN_THE_WAY, Demand
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
 from tilestamp.models.list_schedule import list_schedule
 from tilestamp.models.numbers import Number as M
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
-IN_THE_WAY = 0.5  # of what two want at the same time: each goes first as often as the other
 
 
 class Loads(NamedTuple):
@@ -52,6 +51,8 @@ class Loads(NamedTuple):
     ----------
     sm : ndarray, (units,)
         Of its SM.
+    own : ndarray, (units,)
+        Of the schedulers that it has a warp on; as ``sm`` where it has one on each, or where something else is fuller.
     alone : ndarray, (units,)
         What it takes by itself.
     draws : ndarray, (units,)
@@ -73,6 +74,7 @@ class Loads(NamedTuple):
     """
 
     sm: NDArray[np.float64]
+    own: NDArray[np.float64]
     alone: NDArray[np.float64]
     draws: NDArray[np.float64]
     places: int
@@ -98,6 +100,8 @@ class Played(NamedTuple):
         What a unit takes by itself, in the mean.
     served : float
         What an SM serves in all, in the mean.
+    held : float
+        What all units together take, with their neighbours in the way.
     """
 
     low: float
@@ -106,14 +110,15 @@ class Played(NamedTuple):
     started: float
     own: float
     served: float
+    held: float
 
 
 @kernel
-def load_units(units: Demand, sm: Any, alone: Any) -> None:
-    """Fill in ``Loads.sm`` and ``Loads.alone``."""
+def load_units(units: Demand, sm: Any, own: Any, alone: Any) -> None:
+    """Fill in ``Loads.sm``, ``Loads.own`` and ``Loads.alone``."""
     for i in range(len(sm)):
         busy = max(max(units.issue[i], units.shared[i]), units.l1[i])
-        sm[i] = busy
+        sm[i], own[i] = busy, max(busy, units.scheduler[i])
         alone[i] = max(max(units.alone[i], busy), 1.0)
 
 
@@ -124,8 +129,8 @@ def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, mach
     Parameters
     ----------
     launch : Shape
-    units : tuple of two ndarrays, (units,)
-        ``Loads.sm`` and ``Loads.alone``.
+    units : tuple of three ndarrays, (units,)
+        ``Loads.sm``, ``Loads.own`` and ``Loads.alone``.
     requests : ndarray, (units,)
         Atomic requests.
     terms : ndarray, (len(Term),)
@@ -134,18 +139,18 @@ def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, mach
     machine : ndarray, (len(Number),)
     facts : ndarray, (len(Fact),)
     """
-    count, (sm, alone) = launch.units, units
+    count, (sm, own, alone) = launch.units, units
     places, sms = places_of(launch, machine, facts)
     start = machine[M.LATENCY_BLOCK_LAUNCH_CYCLES] if count else 0.0
     memory = max(terms[Term.DRAM], terms[Term.L2])
     if not launch.drawn:
         atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
         return Loads(
-            sm, alone, np.empty(0), places, sms, terms[Term.START] / max(1, count), start, 0.0, memory, atomic, way
+            sm, own, alone, np.empty(0), places, sms, terms[Term.START] / max(1, count), start, 0.0, memory, atomic, way
         )
     total = requests.sum()
     draws = requests * (terms[Term.QUEUE] / total) if total > 0 else np.full(count, terms[Term.QUEUE] / max(1, count))
-    return Loads(sm, alone, draws, places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
+    return Loads(sm, own, alone, draws, places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
 
 
 @kernel
@@ -162,8 +167,10 @@ def play(units: Loads) -> Played:
     if more and own / units.sms < end + waited:
         lonely, lonely_started = _ends(units, units.alone, units.sms)
         started = lonely_started if lonely < end else started
-        return Played(min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served)
-    return Played(end - waited, end, end + waited, started, mean, served)
+        return Played(
+            min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, own
+        )
+    return Played(end - waited, end, end + waited, started, mean, served, own + more)
 
 
 @kernel
@@ -178,7 +185,7 @@ def crowd(units: Loads) -> tuple[Any, float]:
         return units.alone, 0.0
     work, crowded, waited = _neighbours(units), np.empty(len(units.sm)), 0.0
     for i in range(len(units.sm)):
-        wait = IN_THE_WAY * min(units.sm[i], work)
+        wait = IN_THE_WAY * min(units.own[i], work)
         crowded[i] = units.alone[i] + wait
         waited += wait
     return crowded, waited
@@ -188,9 +195,9 @@ def crowd(units: Loads) -> tuple[Any, float]:
 def _neighbours(units: Loads) -> float:
     """Work of a unit's neighbours on its SM; of more than the longest unit's own it does not matter how much."""
     count, sms = len(units.sm), units.sms
-    longest_unit, work = units.sm.max(), units.sm.sum()
-    if work >= 2 * sms * longest_unit:
-        return longest_unit  # type: ignore[no-any-return]
+    most, work = units.own.max(), units.sm.sum()
+    if work >= sms * (units.sm.max() + most):
+        return most  # type: ignore[no-any-return]
     return np.partition(units.sm, count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
 
 
@@ -203,7 +210,12 @@ def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, r
     row[Result.LOW] = before + max(least, together(units, played, units.begun + played.low, 0.0))
     row[Result.HIGH] = before + max(least, together(units, played, units.begun + played.high, 1.0))
     row[Result.TAIL_CYCLES] = max(0.0, cycles - units.begun - played.started)
-    row[Result.BUSY_SMS] = min(len(units.sm), units.sms)
+    busy = min(len(units.sm), units.sms)
+    row[Result.BUSY_SMS] = busy
+    if len(units.draws):  # by blocks that stay until all is drawn
+        row[Result.HELD] = units.places / units.sms
+    elif played.end:
+        row[Result.HELD] = played.held / (busy * played.end)
     row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], some_idle)
 
 

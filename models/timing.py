@@ -18,6 +18,9 @@ class Timing:
         The term that holds; ``balance`` (idle SMs) and ``tail`` (the last units) are seen by the schedule only.
     occupancy : float
         Share of the SM's warps that are resident, 0 for fixed function.
+    achieved : float
+        The same in the mean over the time in which an SM has any, by the schedule: few or uneven blocks fill no SM, and
+        they start one after another. NaN where nothing was scheduled.
     dram_bytes, l2_bytes : float
         Moved to or from DRAM, and through L2.
     details : dict of str to float
@@ -46,6 +49,7 @@ class Timing:
     low: float = float("nan")
     high: float = float("nan")
     residency: str = ""
+    achieved: float = float("nan")
 
     @property
     def terms(self) -> dict[str, float]:

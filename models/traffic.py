@@ -33,12 +33,19 @@ class Traffic(NamedTuple):
         Share of the bytes loaded that came from DRAM: it sets the latency of a load.
     written_bytes : float
         Of ``l2_bytes``: stores.
+    read_lines, written_lines : float
+        Lines that were moved in part, one for each request.
+    from_l1 : float
+        Share of the bytes that units ask for that L1 holds.
     """
 
     dram_bytes: float
     l2_bytes: float
     load_miss: float
     written_bytes: float = 0.0
+    read_lines: float = 0.0
+    written_lines: float = 0.0
+    from_l1: float = 0.0
 
 
 @dataclass
@@ -61,7 +68,7 @@ def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[T
     """
     caches = caches_of(machine)
     l2 = _Cache(caches.l2_bytes)
-    return [_launch_traffic(_past_l1(_streams(launch), caches.l1_sms), l2) for launch in launches]
+    return [_launch_traffic(_streams(launch), caches.l1_sms, l2) for launch in launches]
 
 
 class Caches(NamedTuple):
@@ -70,6 +77,7 @@ class Caches(NamedTuple):
     Parameters
     ----------
     l2_bytes : int
+        That L2 keeps of what all SMs use.
     l1_sms : int
         SMs whose L1 keeps what they loaded; 0: none does.
     """
@@ -81,16 +89,21 @@ class Caches(NamedTuple):
 def caches_of(machine: Machine) -> Caches:
     """The caches of a machine."""
     keeps = float(machine.compute_capability) >= L1_HOLDS_LOADS
-    return Caches(machine.memory.l2_bytes, machine.sm.count if keeps else 0)
+    kept = round(machine.memory.l2_bytes * machine.memory.l2_kept_share)
+    return Caches(kept, machine.sm.count if keeps else 0)
 
 
 def _past_l1(streams: tuple[Stream, ...], sms: int) -> tuple[Stream, ...]:
     """Streams with the bytes that come from L2, where each of some SMs' L1 holds what that SM asked for before."""
     if not sms:
         return streams
-    return tuple(
-        replace(stream, bytes=_from_l2(stream, sms)) if stream.requested_bytes else stream for stream in streams
-    )
+    return tuple(_scaled(stream, _from_l2(stream, sms)) if stream.requested_bytes else stream for stream in streams)
+
+
+def _scaled(stream: Stream, bytes_: int) -> Stream:
+    """The stream with the bytes that no L1 serves, and such lines in proportion."""
+    lines = stream.partial_lines
+    return replace(stream, bytes=bytes_, partial_lines=lines and lines * bytes_ // stream.requested_bytes)
 
 
 def _from_l2(stream: Stream, sms: int) -> int:
@@ -113,23 +126,39 @@ def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:
     return Stream(f"{name} loads", "load", loads, loads), Stream(f"{name} stores", "store", stores, stores)
 
 
-def _launch_traffic(streams: tuple[Stream, ...], cache: "_Cache") -> Traffic:
+def _launch_traffic(requested: tuple[Stream, ...], l1_sms: int, cache: "_Cache") -> Traffic:
+    streams = _past_l1(requested, l1_sms)
     moved = float(sum(stream.bytes for stream in streams))
+    lines = _lines(streams, "load"), _lines(streams, "store")
     if cache.capacity == 0:
-        return Traffic(moved, 0.0, 1.0)
+        return Traffic(moved, 0.0, 1.0, 0.0, *lines)
     working_set = sum(_footprints(streams).values())
+    passed = max(0.0, working_set - cache.capacity)  # pushes out what lies there before it is reached
     dram = loaded = missed = 0.0
     for stream in streams:
         footprint = min(stream.footprint_bytes, stream.bytes)
         span = stream.span_bytes or working_set
         reuse = (stream.bytes - footprint) * max(0.0, 1.0 - cache.capacity / span) if span else 0.0  # what misses
-        fetched = 0.0 if stream.op == "store" else max(0.0, footprint - cache.holds(stream.buffer))
+        fetched = 0.0 if stream.op == "store" else max(0.0, footprint - max(0.0, cache.holds(stream.buffer) - passed))
         dram += fetched + reuse + cache.touch(stream.buffer, footprint, written=stream.op != "load")
         if stream.op == "load":
             loaded += stream.bytes
             missed += fetched + reuse
     written = float(sum(stream.bytes for stream in streams if stream.op == "store"))
-    return Traffic(dram, moved, missed / loaded if loaded else 0.0, written)
+    from_l1 = _from_l1(streams) if l1_sms else 0.0
+    return Traffic(dram, moved, missed / loaded if loaded else 0.0, written, *lines, from_l1)
+
+
+def _from_l1(streams: tuple[Stream, ...]) -> float:
+    """Share of the bytes that units ask for that L1 holds."""
+    loads = [stream for stream in streams if stream.op == "load"]
+    asked = sum(max(stream.bytes, stream.requested_bytes) for stream in loads)
+    return 1.0 - sum(stream.bytes for stream in loads) / asked if asked else 0.0
+
+
+def _lines(streams: tuple[Stream, ...], op: str) -> float:
+    """Lines that are moved in part."""
+    return sum(stream.lines_in_part for stream in streams if stream.op == op)
 
 
 def _footprints(streams: tuple[Stream, ...]) -> dict[str, int]:

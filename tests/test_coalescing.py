@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.coalescing import contiguous, touched_lines, transactions
 from tilestamp.models.simt import Coalescing
 
 SEGMENTS, LINES, SECTORS = (int(rule) for rule in Coalescing)
@@ -108,3 +108,12 @@ def test_the_closed_form_of_consecutive_words_agrees_with_the_rule(start, count,
     warps = [lanes[i : i + 32] for i in range(0, count, 32)]
     expected = np.sum([transactions(warp, len(warp), 4, rule) for warp in warps], axis=0)
     assert contiguous(start * 4, count * 4, rule) == tuple(expected)
+
+
+@pytest.mark.parametrize(("step", "lines"), [(4, 1), (8, 2), (56, 14), (128, 32), (0, 1)])
+def test_lines_that_a_warp_touches(step, lines):
+    assert touched_lines(np.arange(32, dtype=np.int64) * step, 32) == lines
+
+
+def test_idle_lanes_touch_no_line():
+    assert touched_lines(np.full(32, -1, np.int64), 32) == 0

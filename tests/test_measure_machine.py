@@ -7,7 +7,8 @@ import pytest
 
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.validation.machine_file import busy, machine_file
-from tilestamp.experiments.validation.measuring import Number
+from tilestamp.experiments.validation.measuring import CLASSES, Number
+from tilestamp.experiments.validation.measuring_l2 import kept, lines
 from tilestamp.experiments.validation.measuring_sm import SENT, between
 from tilestamp.models.machine import load_machine
 
@@ -63,6 +64,29 @@ def test_a_file_that_is_no_toml_is_refused_before_anything_runs(capsys):
 def test_a_block_follows_the_one_before_it_on_its_own_sm():
     rows = np.array([[1, 500, 600, 0], [0, 100, 200, 0], [0, 515, 700, 0], [1, 100, 190, 0], [0, 1000, 1100, 0]])
     assert between(rows).tolist() == [315, 300, 310]
+
+
+def test_lines_in_part_are_what_single_sectors_take_beyond_their_bytes():
+    """Ten clocks for 32 bytes in whole lines; a sector by itself takes fifteen: a line in five clocks."""
+    assert lines(np.array([3.2]), np.array([32 / 15])).tolist() == pytest.approx([1 / 5])
+
+
+def test_l2_keeps_what_is_not_fetched_twice_over():
+    """1 us a MiB and 2 to start; 48 MiB take 28 us longer: 14 MiB are missed twice over at 1 MiB a microsecond."""
+    times = {size << 20: 2.0 + size for size in (12, 18, 24)} | {48 << 20: 2.0 + 48 + 28}
+    found = kept(times, 60 << 20, (1 << 20) / 1e3)
+    assert found.value == pytest.approx(34 / 60)
+    assert "48 MiB 78.00 us" in found.how
+
+
+def test_an_l2_that_keeps_all_is_no_larger_than_it_is():
+    assert kept({size << 20: 2.0 + size for size in (12, 18, 24, 48)}, 40 << 20, 1000.0).value == 1.0
+
+
+def test_a_mixture_of_branches_and_uniform_instructions_is_taken_over():
+    assert "control" not in CLASSES
+    text = machine_file(NUMBERS, H200, "mine", "My GPU, measured", "9.0")
+    assert f'control = {{ value = {H200.pipe.control}, provenance = "assumed"' in text
 
 
 def test_what_one_sm_sends_is_apart_from_what_the_chip_takes():

@@ -31,11 +31,14 @@ ROUND = {  # 2 SMs at 1 GHz: a cycle is a nanosecond
     "memory.bank_pass_cycles": 1.0,
     "memory.dram_gb_per_s": 100.0,
     "memory.dram_efficiency": 0.5,
+    "memory.l2_kept_share": 1.0,
     "memory.l2_bytes_per_clock": 64.0,
     "memory.l2_write_bytes_per_clock": 16.0,
     "memory.l1_bytes_per_clock": 32.0,
     "memory.l1_write_bytes_per_clock": 8.0,
-    "memory.l1_local_bytes_per_clock": 16.0,
+    "memory.l1_line_cycles": 5.0,
+    "memory.l2_read_lines_per_clock": 2.0,
+    "memory.l2_write_lines_per_clock": 0.5,
     "latency.alu_cycles": 10.0,
     "latency.shared_cycles": 20.0,
     "latency.l2_cycles": 100.0,
@@ -55,9 +58,9 @@ MACHINE = altered(load_machine("h200"), ROUND, "assumed", "a test")
 NOTHING = Traffic(0.0, 0.0, 0.0)
 
 
-def asked(load_miss=0.0, machine=MACHINE, **description):
+def asked(moved=NOTHING, machine=MACHINE, **description):
     """Demand of each unit."""
-    return demand(launch(**{"units": 1, "block": 128, **description}), machine, load_miss)
+    return demand(launch(**{"units": 1, "block": 128, **description}), machine, moved)
 
 
 def terms(moved=NOTHING, machine=MACHINE, **description):
@@ -100,10 +103,35 @@ def test_atomics_in_shared_memory_are_accesses():
 
 
 def test_stores_take_the_load_path_at_their_own_rate():
-    """A transaction is a sector of 32 bytes; what is stored beyond transactions went to local memory."""
     assert asked(LOAD_BYTES=320).l1 == 320 / 32
-    assert asked(STORE_BYTES=320, STORE_TRANSACTIONS=10).l1 == 320 / 8
-    assert asked(STORE_BYTES=320, STORE_TRANSACTIONS=4).l1 == 128 / 8 + 192 / 16
+    assert asked(STORE_BYTES=320).l1 == 320 / 8
+
+
+def test_lines_that_are_moved_in_part_take_the_sm_their_own_cycles():
+    """Loads by what each unit loads; stores by the lines a byte stored, however many bytes left L1."""
+    what = launch(units=2, LOAD_BYTES=100)
+    what.events[1, E.LOAD_BYTES] = 300
+    assert demand(what, MACHINE, Traffic(0, 400, 0, read_lines=8)).l1.tolist() == [100 / 32 + 2 * 5, 300 / 32 + 6 * 5]
+    stored = Traffic(0, 64, 0, written_bytes=64, written_lines=4)
+    assert asked(stored, STORE_BYTES=32).l1 == 32 / 8 + 2 * 5
+
+
+def test_lines_that_are_moved_in_part_take_l2_more_than_their_bytes():
+    moved = Traffic(0.0, 640.0, 0.0, 160.0, read_lines=10.0, written_lines=3.0)
+    assert terms(moved)["l2"] == 480 / 64 + 160 / 16 + 10 / 2 + 3 / 0.5
+
+
+def test_a_warp_waits_for_others_of_its_block_on_its_scheduler():
+    """Half of what both want: 8 warps are two a scheduler, 16 are four."""
+    assert asked(block=128, FP32=80, CHAIN_ALU=100).alone == 1040
+    assert asked(block=256, FP32=80, CHAIN_ALU=100).alone == 1040 + 20 / 2 / 2
+    assert asked(block=512, FP32=80, CHAIN_ALU=100).alone == 1040 + 20 / 4 / 2
+
+
+def test_loads_that_l1_holds_are_its_round_trips():
+    near = altered(MACHINE, {"latency.l1_cycles": 30.0}, "assumed", "a test")
+    moved = Traffic(0, 0, 0.5, from_l1=0.75)
+    assert asked(moved, near, CHAIN_LOAD=1, dispatch="block_queue").chain == 0.75 * 30 + 0.25 * (100 + 500) / 2
 
 
 def test_l2_takes_stores_at_their_own_rate():
@@ -165,7 +193,7 @@ def test_dependent_steps_wait_one_after_another(events, cycles):
 
 
 def test_a_load_waits_for_dram_by_the_share_that_misses():
-    assert asked(0.25, CHAIN_LOAD=1).chain == 40 + 100 + 400 / 4
+    assert asked(Traffic(0.0, 0.0, 0.25), CHAIN_LOAD=1).chain == 40 + 100 + 400 / 4
 
 
 def test_a_kernel_without_work_takes_its_launch():

@@ -181,3 +181,16 @@ def test_blocks_that_end_faster_than_they_start_leave_places_free_on_many_sms():
 
 def test_a_launch_without_work_is_all_overhead():
     assert schedule(launch(0, grid=1), H200, NOTHING).bound == "launch"
+
+
+@pytest.mark.parametrize(("blocks", "share"), [(33, 1 / 64), (132, 1 / 64), (264, 2 / 64), (132 * 64, 32 / 64)])
+def test_few_blocks_fill_no_sm(blocks, share):
+    """Blocks of a warp, all alike and long: an SM has places for 32, and holds what it gets."""
+    got = schedule(launch(units=blocks, block=32, CHAIN_LOAD=10**4), H200, NOTHING)
+    assert got.occupancy == 32 / 64
+    assert got.achieved == pytest.approx(share, rel=0.01)
+
+
+def test_blocks_that_draw_stay_to_the_end():
+    units = launch(units=10, block=256, dispatch="block_queue", CHAIN_LOAD=10**4)
+    assert schedule(units, H200, NOTHING).achieved == 8 / 64

@@ -280,7 +280,9 @@ def test_stores_that_scatter_leave_an_sm_at_their_own_rate():
     machine = load_machine("ga104")
     setup = thread_per_item("TriangleSetup", "TriangleSetup", 2304, 256, SIMT, stores=(Access("setup", 140, 35),))
     launch = load_mix("binned", "8.6").launch(setup, 32)
-    gathered = altered(machine, {"memory.l1_write_bytes_per_clock": 0.0}, "assumed", "a test")
+    gathered = altered(
+        machine, {"memory.l1_write_bytes_per_clock": 0.0, "memory.l1_line_cycles": 0.0}, "assumed", "a test"
+    )
     assert price([launch], machine)[0].cycles > 2.0 * price([launch], gathered)[0].cycles
 
 

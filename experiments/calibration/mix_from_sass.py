@@ -27,7 +27,9 @@ from tilestamp.experiments.calibration.sass import (
 ALU_CYCLES = 4.11  # of one step of chain_alu: the machine file's latency.alu_cycles
 SHARED_CYCLES = LATENCY["LDS"]
 WARP = 32
-QUADS = 9  # a grid
+QUADS, VERTICES = 9, 16  # a grid
+ENTRIES_A_SECTOR = 8  # indices of grids, 4 bytes each
+L1_CYCLES = 32.04  # the machine file's latency.l1_cycles
 RASTER = "_Z8k_rasterILi{tile}ELi{spp}ELi{mode}EEvPK6float4PKjS4_S4_iiiPjPfPy"
 ADDRESS = "_Z6k_addrILi{slots}EEvPK6float4iiiiPjS3_"
 WRITE = "_Z7k_writeILi{slots}EEvPK6float4iiiiPKjS4_Pj"
@@ -71,7 +73,7 @@ def raster_prices(sections: Sections, tile: int, spp: int) -> dict[str, Price]:
     prices: dict[str, Price] = {
         "PIXEL_WARPS": counted(s["PIXEL"]) | chain(s["PIXEL"], alone) | {"chain_load": alone, "lanes": "PIXEL_LANES"},
         "LIST_WARPS": counted(s["LIST"]) | chain(s["LIST"], alone) | {"chain_load": alone} | threads,
-        "BATCHES": chain(s["BATCH"] + s["GATHER"]) | {"chain_load": 2.0, "chain_barrier": 2.0},
+        "BATCHES": _batch(s["BATCH"] + s["GATHER"], tile),
         "BATCH_WARPS": counted(s["BATCH"]) | threads,
         "GATHER_WARPS": counted(s["GATHER"]) | {"lanes": "GATHER_LANES"},
         "GRIDS": grids,
@@ -84,6 +86,14 @@ def raster_prices(sections: Sections, tile: int, spp: int) -> dict[str, Price]:
         prices["SUBTILE_PASS"] = chain(s["BOX_TEST"], copies)
         prices["BOX_TEST_WARPS"] = counted(s["BOX_TEST"], copies) | {"lanes": "BOX_TEST_LANES"}
     return prices
+
+
+def _batch(blocks: list[Block], tile: int) -> Price:
+    """Round trips of one batch: its entries of the list, in L1 where a sector of eight came before; its grids."""
+    fetched = min(1.0, tile * tile / VERTICES / ENTRIES_A_SECTOR)
+    price = chain(blocks)
+    price["chain_alu"] = float(price["chain_alu"]) + (1.0 - fetched) * L1_CYCLES / ALU_CYCLES
+    return price | {"chain_load": 1.0 + fetched, "chain_barrier": 2.0}
 
 
 def patch_prices(code: list[Instruction], event: str, chains: Price) -> dict[str, Price]:

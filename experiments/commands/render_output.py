@@ -17,6 +17,7 @@ COST = {"blocks": ",.0f", "warps": ",.0f", "instructions": ",.0f", "simd_efficie
 TIME = {  # after them
     "atomics": ",.0f",
     "occupancy": ".2f",
+    "achieved_occupancy": ".2f",
     "milliseconds": ".3f",
     "bound": "s",
 }

@@ -7,17 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.validation.gpu import cupy, in_a_graph, launch, microseconds, module, spread
+from tilestamp.experiments.validation.gpu import cupy, in_a_graph, launch, microseconds, module
 from tilestamp.experiments.validation.measuring import MIB, Number, attribute, cycles_of, number
+from tilestamp.experiments.validation.measuring_l2 import owners
 
 ROUNDS = 64  # atomics a thread
 SPACINGS = (32, 64, 128, 256, 512, 1024, 2048, 4096)  # bytes between counters
 PLACES = 24  # of a table of counters: the hash of addresses lets some collide
 KERNELS = 200
+NODES = 8  # of a graph as a frame's is: with many, the launch of the graph would not count
 
 
 def bandwidths(sms: int, mhz: float) -> Iterator[Number]:
-    """DRAM, L2 and L1 by bytes a clock; stores that scatter; banks."""
+    """DRAM, L2 and L1 by bytes a clock; banks."""
     cp = cupy()
     large = _power_of_two(min(2048 * MIB, int(cp.cuda.runtime.memGetInfo()[0]) // 4))
     buffer, out = cp.zeros(large // 4, cp.float32), cp.zeros(1, cp.float32)
@@ -31,10 +33,6 @@ def bandwidths(sms: int, mhz: float) -> Iterator[Number]:
     yield number("memory.dram_gb_per_s", read(large, 1) / 1e3, f"reading {large // MIB} MiB: sustained")
     how = f"reading {part // MIB} MiB again and again, past L1"
     yield number("memory.l2_bytes_per_clock", read(part, 256) / mhz, how)
-    mask = np.uint64(part // 4 - 1)
-    times = microseconds(lambda: launch("scatter", sms * 8, 256, [buffer, mask, 256]))
-    scattered = sms * 8 * 256 * 256 * 32 / times / mhz
-    yield number("memory.l2_write_bytes_per_clock", scattered, "stores of one word to random sectors")
     l1 = cycles_of("read_l1", sms, 256, lambda c, _: [buffer, 512, c, out])
     yield number("memory.l1_bytes_per_clock", 512 * 8 * 256 * 16 / l1, "hits in L1, 16 bytes a lane")
     straight, worst = _bank_cycles(sms, 1), _bank_cycles(sms, 32)
@@ -70,8 +68,9 @@ def atomics(sms: int, mhz: float) -> Iterator[Number]:
     blind = rate("atomics_random", word(1_000_000), 0)
     yield number("atomics.requests_per_clock", awaited / mhz, "a million random sectors, value used")
     yield number("atomics.unawaited_per_clock", blind / mhz, "a million random sectors, no value")
-    units = max(1, round(float(np.median(blind) / np.median(one))))
-    yield Number("atomics.units", units, spread(blind), "random sectors over one address")
+    units = owners()
+    yield Number("atomics.units", units, 0.0, "words of 512 bytes each whose additions are in each other's way")
+    yield number("atomics.spread_ns_per_request", 1e3 * units / blind, "a million random sectors, no value, by units")
 
     def spaced(bytes_: int) -> float:
         pattern = (word(8), word(bytes_ // 4), word(0), everything, word(0))
@@ -115,8 +114,10 @@ def launches() -> Iterator[Number]:
 
     yield number("launch.stream_us", microseconds(row) / KERNELS, f"{KERNELS} empty kernels, launched from Python")
     yield number("launch.sync_us", _waited(empty), "an empty kernel and a wait, launched from Python")
-    replay = in_a_graph(lambda: launch("empty", 1, 32, []), KERNELS)
-    yield number("launch.graph_us", microseconds(replay) / KERNELS, f"{KERNELS} empty kernels in a graph")
+    replay = in_a_graph(lambda: launch("empty", 1, 32, []), NODES)
+    yield number(
+        "launch.graph_us", microseconds(replay) / NODES, f"{NODES} empty kernels in a graph, its launch included"
+    )
     blocks = 1_000_000
     times = microseconds(lambda: launch("empty", blocks, 32, []))
     yield number("launch.blocks_per_us", blocks / times, "a million empty blocks")

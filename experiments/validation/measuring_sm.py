@@ -16,9 +16,9 @@ from tilestamp.experiments.validation.measuring import MIB, Number, attribute, n
 LAPS = 20  # blocks on an SM, one after another
 THREADS = 1024
 ROUNDS = 512
+SECTOR, QUAD = 32, 16  # bytes: what a word that lies by itself moves, and what a lane stores of a whole line
 SENT = {  # number of a machine file: kernel, what a lane sends, and how
-    "memory.l1_write_bytes_per_clock": ("store_scattered", 32, "stores of a word to random sectors"),
-    "memory.l1_local_bytes_per_clock": ("store_quads", 16, "stores of whole lines"),
+    "memory.l1_write_bytes_per_clock": ("store_quads", 16, "stores of whole lines"),
     "atomics.sm_requests_per_clock": ("atomic_awaited", 1, "random sectors, value used"),
     "atomics.sm_unawaited_per_clock": ("atomic_blind", 1, "random sectors, no value"),
 }
@@ -29,7 +29,9 @@ def one_sm(sms: int) -> Iterator[Number]:
     yield number("latency.block_launch_cycles", _block_starts(sms), "from the end of a block to the next, one an SM")
     buffer = cupy().zeros(4 * MIB, cupy().uint32)
     for key, (kernel, unit, how) in SENT.items():
-        yield number(key, unit * THREADS * ROUNDS / _cycles(kernel, buffer), f"{how}, one SM alone")
+        yield number(key, unit * THREADS * ROUNDS / sent(kernel, buffer), f"{how}, one SM alone")
+    apart = SECTOR * (sent("store_scattered", buffer) / SECTOR - sent("store_quads", buffer) / QUAD) / THREADS / ROUNDS
+    yield number("memory.l1_line_cycles", apart, "stores of a word to random sectors, beyond those of whole lines")
 
 
 def _block_starts(sms: int) -> NDArray[np.float64]:
@@ -56,14 +58,14 @@ def between(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     return gaps
 
 
-def _cycles(kernel: str, buffer: Any) -> NDArray[np.float64]:
-    """Cycles of one block of a sending kernel, over the repeats."""
+def sent(kernel: str, buffer: Any, sms: int = 1) -> NDArray[np.float64]:
+    """Cycles of the slowest block of a sending kernel, one on each of some SMs, over the repeats."""
     cp = cupy()
-    cycles, out = cp.zeros(1, cp.int64), cp.zeros(THREADS, cp.uint32)
+    cycles, out = cp.zeros(sms, cp.int64), cp.zeros(sms * THREADS, cp.uint32)
     found = []
     for _ in range(REPEATS):
-        _alone(kernel, 1, THREADS, [buffer, np.uint32(buffer.size - 1), np.int32(ROUNDS), cycles, out])
-        found.append(float(cycles[0]))
+        _alone(kernel, sms, THREADS, [buffer, np.uint32(buffer.size - 1), np.int32(ROUNDS), cycles, out])
+        found.append(float(cycles.max()))
     return np.array(found[1:])
 
 

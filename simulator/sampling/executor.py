@@ -7,7 +7,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from tilestamp.models.demand import demand
+from tilestamp.models.demand import UNKNOWN, demand
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Stream
 from tilestamp.models.machine import Machine
@@ -118,7 +118,7 @@ class SampledExecutor(Executor):
         rows = part.sample.rows
         work = replace(part.stage.work(rows, **part.inputs), table=rows, streams=())
         launch = load_mix(self.pipeline, self.machine.compute_capability).launch(work, self.machine.sm.warp_size)
-        asked = demand(launch, self.machine, 1.0)
+        asked = demand(launch, self.machine, UNKNOWN)
         counts = [rows[:, work.events[counter.event]] for counter in work.counters if counter.kind == "count"]
         instructions = launch.events[:, list(INSTRUCTION_CLASSES)].sum(axis=1)
         return np.stack([instructions, asked.issue, asked.chain, *counts], axis=1).astype(np.float64)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tilestamp.models.demand import demand
+from tilestamp.models.demand import UNKNOWN, demand
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.launch import Launch
@@ -97,7 +97,7 @@ def milliseconds(
     steps = [price(STEP * rest, columns).milliseconds - timing.milliseconds for columns in (ISSUED, CHAIN, SENT)]
     slopes = np.where(remains > 0, np.array(steps) / STEP / np.where(remains > 0, remains, 1.0), 0.0)
     half = float(totals(sample, product(costs, slopes[:, None])).half_width[0])
-    long = rest * (demand(launch, machine, 1.0).alone > LONG * timing.cycles)
+    long = rest * (demand(launch, machine, UNKNOWN).alone > LONG * timing.cycles)
     unseen = _beyond(price(_unlike(sample, costs) * long, EVERYTHING)) - _beyond(timing) if long.any() else 0.0
     return around(timing.milliseconds, half + max(unseen, 0.0) + LEAST * timing.milliseconds)
 
@@ -116,7 +116,7 @@ def _unlike(sample: Sample, costs: Floats) -> float:
 
 def _costs(launch: Launch, machine: Machine) -> Floats:
     """Cycles of the units of a launch by ``ISSUED``, ``CHAIN`` and ``SENT``."""
-    asked = demand(launch, machine, 1.0)
+    asked = demand(launch, machine, UNKNOWN)
     start = machine.latency.block_launch_cycles if launch.dispatch == "blocks" else 0.0
     issued = asked.issue if asked.issue.sum() >= asked.shared.sum() else asked.shared
     return np.stack([issued, asked.chain - start, asked.l1], axis=1)

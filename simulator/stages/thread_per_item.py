@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tilestamp.models.coalescing import transactions
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import LINE_BYTES, Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.work import Work
 
@@ -91,7 +91,8 @@ def thread_per_item(
             table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
             footprint = items * access.stride
             moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
-            streams.append(Stream(access.buffer, op, moved, footprint))
+            lines = partial_lines(access, simt.warp) if op == "store" else 0
+            streams.append(Stream(access.buffer, op, moved, footprint, partial_lines=lines * int(warps.sum())))
     table = np.concatenate([table, np.zeros((idle_blocks, len(ThreadEvent)), np.int64)])
     return Work(
         stage=stage,
@@ -114,3 +115,12 @@ def record_transactions(access: Access, simt: Simt) -> tuple[int, int]:
         count += n
         total += size
     return count, total
+
+
+def partial_lines(access: Access, warp: int) -> int:
+    """Lines that the memory instructions of a whole warp on consecutive records fill in part."""
+    if access.stride == access.word_bytes:
+        return 0
+    lanes = np.arange(warp, dtype=np.int64)[:, None] * access.stride
+    lines = (lanes + np.arange(access.words) * access.word_bytes) // LINE_BYTES
+    return sum(len(np.unique(word)) for word in lines.T)

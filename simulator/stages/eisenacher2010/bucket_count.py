@@ -254,7 +254,9 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
         size = int(sizes[rows.start or 0])
         stores = contiguous(0, size * WORD_BYTES, int(simt.coalescing))
         table[rows, [BucketInitEvent.STORE_TRANSACTIONS, BucketInitEvent.STORE_BYTES]] = stores
-    stream = Stream("COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES)
+    stream = Stream(
+        "COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES, partial_lines=0
+    )
     return Work(
         stage="bucket_count",
         kernel="bucket_init",
@@ -277,7 +279,7 @@ def _address_work(
     total = table.sum(axis=0)
     streams = (
         Stream("boxes", "load", int(total[_E.LOAD_BYTES]), patches * BOX_BYTES),
-        Stream("IDX", "store", int(total[_E.STORE_BYTES]), patches * tiles.slots**2 * WORD_BYTES),
+        Stream("IDX", "store", int(total[_E.STORE_BYTES]), patches * tiles.slots**2 * WORD_BYTES, partial_lines=0),
         Stream(
             "COUNT",
             "atomic",

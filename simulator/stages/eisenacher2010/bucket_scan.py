@@ -132,13 +132,13 @@ def _scan_work(level: int, size: int, simt: Simt) -> Work:
     nbytes = size * WORD_BYTES
     streams = [
         Stream(source, "load", int(table[:, _E.LOAD_BYTES].sum()), nbytes),
-        Stream(target, "store", int(table[:, _E.STORE_BYTES].sum()), nbytes),
+        Stream(target, "store", int(table[:, _E.STORE_BYTES].sum()), nbytes, partial_lines=0),
     ]
     if len(table) > 1:
         before = int(table[:, _E.STORE_BYTES].sum())
         _add_word(table, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES], simt)
         written = int(table[:, _E.STORE_BYTES].sum()) - before
-        streams.append(Stream(f"SUMS{level + 1}", "store", written, len(table) * WORD_BYTES))
+        streams.append(Stream(f"SUMS{level + 1}", "store", written, len(table) * WORD_BYTES, partial_lines=0))
     return _work("scan_blocks", size, table, SHARED_BYTES, tuple(streams))
 
 
@@ -152,7 +152,7 @@ def _add_work(level: int, size: int, simt: Simt) -> Work:
     sums = int(table[:, _E.LOAD_BYTES].sum()) - moved
     streams = (
         Stream(target, "load", moved, nbytes),
-        Stream(target, "store", moved, nbytes),
+        Stream(target, "store", moved, nbytes, partial_lines=0),
         Stream(f"SUMS{level + 1}", "load", sums, len(table) * WORD_BYTES),
     )
     return _work("add_sums", size, table, WORD_BYTES, streams)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import transactions
+from tilestamp.models.coalescing import touched_lines, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -43,6 +43,7 @@ class BucketWriteEvent(IntEnum):
     IDX_BYTES = 11  # of LOAD_BYTES: IDX
     LAST_WRITE_WARPS = 12  # of WRITE_WARPS: the last slot, which compilers branch around and do not predicate
     LAST_WRITE_LANES = 13
+    STORE_LINES = 14  # lines of 128 bytes that the stores touch
 
 
 _E = BucketWriteEvent
@@ -84,6 +85,7 @@ def _count_slot(
     count, size = transactions(addresses, lanes, WORD_BYTES, coalescing)
     row[_E.STORE_TRANSACTIONS] += count
     row[_E.STORE_BYTES] += size
+    row[_E.STORE_LINES] += touched_lines(addresses, lanes)
 
 
 @kernel
@@ -167,10 +169,11 @@ def bucket_write(
 def _streams(table: NDArray[np.int64], patches: int, tiles: Tiles, count: NDArray[np.uint32]) -> tuple[Stream, ...]:
     """Buffers that the kernel touches, from the rows of its blocks."""
     total = table.sum(axis=0)
+    written, entries = int(total[_E.STORE_BYTES]), int(count.sum(dtype=np.int64))
     own = int(total[_E.LOAD_BYTES] - total[_E.BOX_BYTES] - total[_E.IDX_BYTES])
     return (
         Stream("boxes", "load", int(total[_E.BOX_BYTES]), patches * BOX_BYTES),
         Stream("IDX", "load", int(total[_E.IDX_BYTES]), patches * tiles.slots**2 * WORD_BYTES),
         Stream("START", "load", own, int(np.count_nonzero(count)) * WORD_BYTES),
-        Stream("LISTS", "store", int(total[_E.STORE_BYTES]), int(count.sum(dtype=np.int64)) * WORD_BYTES),
+        Stream("LISTS", "store", written, entries * WORD_BYTES, partial_lines=int(total[_E.STORE_LINES])),
     )

@@ -63,8 +63,8 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
     streams = (
         Stream("queue", "load", entries, entries),
         Stream("points", "load", moved - entries, patches * VERTICES * POINT_BYTES),
-        Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES),
-        Stream("boxes", "store", boxes, boxes),
+        Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES, partial_lines=0),
+        Stream("boxes", "store", boxes, boxes, partial_lines=0),
     )
     return Work(
         stage="dice",

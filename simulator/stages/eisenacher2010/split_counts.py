@@ -185,7 +185,10 @@ def transform_work(patches: int, simt: Simt) -> Work:
     table[:, [_T.LOAD_TRANSACTIONS, _T.LOAD_BYTES]] = moved
     table[:, [_T.STORE_TRANSACTIONS, _T.STORE_BYTES]] = moved
     total, nbytes = int(table[:, _T.LOAD_BYTES].sum()), points * POINT_BYTES
-    load, store = Stream("points", "load", total, nbytes), Stream("clip_points", "store", total, nbytes)
+    load, store = (
+        Stream("points", "load", total, nbytes),
+        Stream("clip_points", "store", total, nbytes, partial_lines=0),
+    )
     return _work("transform", _T, table, load, store)
 
 
@@ -211,7 +214,7 @@ def oracle_streams(table: NDArray[np.int64], patch: NDArray[np.int32]) -> tuple[
     return (
         Stream("queue", "load", entries, entries),
         Stream("clip_points", "load", int(total[_O.LOAD_BYTES]) - entries, distinct * POINTS * POINT_BYTES),
-        Stream("slots", "store", int(total[_O.STORE_BYTES]), len(patch) * WORD_BYTES),
+        Stream("slots", "store", int(total[_O.STORE_BYTES]), len(patch) * WORD_BYTES, partial_lines=0),
     )
 
 

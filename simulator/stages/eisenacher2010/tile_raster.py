@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import LINE_BYTES, SECTOR_BYTES, Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import divisible
@@ -146,9 +146,12 @@ def shared_bytes(shape: BlockShape) -> int:
 
 
 def _streams(
-    table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, shape: BlockShape, simt: Simt
+    table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, shape: BlockShape, simt: Simt, rows: int
 ) -> tuple[Stream, ...]:
-    """Buffers that the kernel touches, by the rows of all tiles; of ``grids`` those that are in a list."""
+    """Buffers that the kernel touches, by the rows of all tiles; of ``grids`` those that are in a list.
+
+    Tiles that share a grid are neighbours, at most a row of tiles apart.
+    """
     total = table.sum(axis=0)
     seen = np.zeros(grids, np.bool_)
     seen[lists] = True
@@ -156,10 +159,11 @@ def _streams(
     vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
     edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
+    stored, row = int(total[_E.STORE_BYTES]), max(SECTOR_BYTES, shape.tile * WORD_BYTES)
     streams = [
-        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES),
+        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES, 2 * vertex_bytes // rows),
         Stream("LISTS", "load", rest, len(lists) * WORD_BYTES + 2 * len(table) * WORD_BYTES),
-        Stream("framebuffer", "store", int(total[_E.STORE_BYTES]), int(total[_E.STORE_BYTES])),
+        Stream("framebuffer", "store", stored, stored, partial_lines=0 if row >= LINE_BYTES else stored // row),
     ]
     if shape.loaded:
         streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
@@ -180,7 +184,9 @@ def _work(
 ) -> Work:
     """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
     shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
-    return raster_work(shape, table, _streams(table, lists, len(vertices), shape, simt))
+    return raster_work(
+        shape, table, _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
+    )
 
 
 def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import smallest_transaction_bytes
-from tilestamp.models.launch import Stream
+from tilestamp.models.launch import SECTOR_BYTES, Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import Known
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import HEADER_BYTES, PIXELS, SEGMENT, TILE, FineRasterEvent
@@ -108,11 +108,16 @@ def _streams(
     pixels = 2 * 4 * PIXELS * samples * (-(-width // TILE) * -(-height // TILE))
     tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS * samples
     rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
-    records = kept * setup.planes.shape[1] * 4
     return (
         Stream("tile_queues", "load", lists, 4 * entries),
-        Stream("headers", "load", min(headers, kept * HEADER_BYTES), kept * HEADER_BYTES, requested_bytes=headers),
-        Stream("triangle_data", "load", min(rest, records), records, requested_bytes=rest),
+        _gathered("headers", headers, kept * HEADER_BYTES),
+        _gathered("triangle_data", rest, kept * setup.planes.shape[1] * 4),
         Stream("pixels", "load", tiles, pixels if tiles else 0),
         Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
     )
+
+
+def _gathered(buffer: str, requested: int, size: int) -> Stream:
+    """Records that lanes read each for itself: hardly two lie in one line."""
+    lines = requested // SECTOR_BYTES
+    return Stream(buffer, "load", min(requested, size), size, requested_bytes=requested, partial_lines=lines)

@@ -40,6 +40,7 @@ from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
 from tilestamp.simulator.work import Work
 
 POSITIONS_A_SECTOR = 2  # vertices of 16 bytes in the 32 that a cache fetches
+POSITIONS_A_LINE = 8
 Release = Literal["1.1", "nvdiffrast"]
 
 BLOCK = 64  # threads, a triangle each
@@ -272,6 +273,13 @@ def _asked(triangles: NDArray[np.int32]) -> int:
     return POSITIONS_A_SECTOR * POSITION_BYTES * int(len(sectors) + np.count_nonzero(np.diff(sectors, axis=1)))
 
 
+def _lines(triangles: NDArray[np.int32]) -> int:
+    """Lines that the warps' loads of vertices touch: one corner of each of a warp's triangles at a time."""
+    warps = np.pad(triangles, ((0, -len(triangles) % WARP), (0, 0)), mode="edge" if triangles.size else "constant")
+    lines = np.sort((warps // POSITIONS_A_LINE).reshape(-1, WARP, 3), axis=1)
+    return int(3 * len(lines) + np.count_nonzero(np.diff(lines, axis=1)))
+
+
 def _streams(
     positions: NDArray[np.float32], triangles: NDArray[np.int32], out: Setup, view: View
 ) -> tuple[Stream, ...]:
@@ -288,10 +296,12 @@ def _streams(
         data //= 2
     return (
         Stream("indices", "load", indices, indices),
-        Stream("positions", "load", vertices, vertices, requested_bytes=_asked(triangles)),
+        Stream(
+            "positions", "load", vertices, vertices, requested_bytes=_asked(triangles), partial_lines=_lines(triangles)
+        ),
         Stream("subtriangles", "store", len(out.first), len(out.first)),
-        Stream("headers", "store", headers, headers),
-        Stream("triangle_data", "store", data, data),
+        Stream("headers", "store", headers, headers, partial_lines=0),
+        Stream("triangle_data", "store", data, data, partial_lines=0),
     )
 
 
