@@ -195,9 +195,10 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
     name = f"{pipeline}/{path.stem}"
     tables = tomllib.loads(text)
     fits = tables.pop("fits", {})
+    completed: dict[str, dict[str, Any]] = {}
     for kernel, table in tables.items():
-        tables[kernel] = _completed(name, tables, table)
-    kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in tables.items()}
+        completed[kernel] = _completed(name, completed, table)
+    kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in completed.items()}
     return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
 
 
@@ -209,15 +210,14 @@ def _path_for(pipeline: str, major: int) -> Path:
     return max([f for f in families if f[0] <= major] or families[:1])[1]
 
 
-def _completed(mix: str, tables: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+def _completed(mix: str, tables: dict[str, dict[str, Any]], table: dict[str, Any]) -> dict[str, Any]:
     """A table with what it leaves to the one that it is like, which stands before it."""
     like = table.get("like")
     if like is None:
         return table
     if like not in tables:
         raise TilestampError(f"the mix {mix} has a table like {like}, which it does not have")
-    completed: dict[str, Any] = tables[like] | table
-    return completed
+    return tables[like] | table
 
 
 def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, list[str]]) -> KernelMix:
