@@ -17,6 +17,8 @@ def list_schedule(
 ) -> tuple[float, float]:
     """End of all units; the start of the one that ends last.
 
+    Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
+    taken does not start at once later.
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
     there are no more places than SMs, an SM has always served it by then.
     """
@@ -25,8 +27,9 @@ def list_schedule(
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
     drawn = end = last_start = 0.0
+    begun = -interval
     for i in range(units):
-        begun = i * interval
+        begun += interval
         if i >= places:
             begun = max(begun, free[0])
         done = max(served[0], begun + start) + sm[i]

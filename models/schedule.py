@@ -1,7 +1,8 @@
 """Schedule: when units of work start, who is in whose way, and how long the last ones take.
 
-The machine hands units to places in order: to the place that is free first, a block not sooner than the block launch
-rate allows. A unit takes its place until three things are over:
+The machine hands units to places in order: to the place that is free first, a block not sooner after the one before it
+than the block launch rate allows. So while long blocks fill all places nothing starts, and that time is lost: empty
+blocks behind them have to be started one by one. A unit takes its place until three things are over:
 
 *Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want the SM at the
 same time for at most the smaller of its own work there and theirs, and of two that want the same each goes first as

@@ -17,6 +17,8 @@ What was fitted to measured cells says which of its columns were (``fitted = ["c
 where only so much of one was) and to which cells (``fitted_to``: ``tilestamp.models.fitted``, or the name of a list in
 the table ``fits`` of the file). Without ``fitted`` all columns of a table of provenance ``fitted`` were.
 
+``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp. L1
+holds it; with ``uncached_local = true`` in the kernel's table (compute capability 1.x) it is a buffer as others are.
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own.
 """
@@ -27,7 +29,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +38,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Launch
+from tilestamp.models.launch import Launch, Stream
 from tilestamp.models.sums import TOGETHER, sum_up
 from tilestamp.models.used import note
 from tilestamp.simulator.work import Work
@@ -61,6 +63,8 @@ class KernelMix:
         By event name ("" for the kernel): (kind, source).
     fitted : dict
         By event and column: what was fitted of a price.
+    uncached : bool
+        Whether local memory passes L1 by.
     """
 
     kernel: str
@@ -69,6 +73,7 @@ class KernelMix:
     prices: dict[str, dict[str, Any]]
     provenance: dict[str, tuple[str, str]]
     fitted: dict[tuple[str, str], Fitted] = field(default_factory=dict)
+    uncached: bool = False
 
     @property
     def as_moved(self) -> "KernelMix":
@@ -144,7 +149,7 @@ class Mix:
             shared_bytes=work.shared_bytes + kernel.shared_bytes,
             events=_machine_events(kernel.matrix(work.events, warp), work.table),
             dispatch=work.dispatch,
-            streams=work.streams,
+            streams=(*work.streams, *_local_memory(kernel, work)),
             atomic_requests=work.atomic_requests,
         )
 
@@ -166,6 +171,18 @@ def _add_up(matrix: Any, table: Any, events: Any) -> None:
             for column in range(columns):
                 block[column, i] = table[first + i, column]
         sum_up(matrix, block, 0, count, events, first)
+
+
+def _local_memory(kernel: KernelMix, work: Work) -> list[Stream]:
+    """Local memory beside the buffers of the stage, where L1 does not hold it; a work without buffers needs no more."""
+    if not (kernel.uncached and work.streams):
+        return []
+    moved: dict[Literal["load", "store"], float] = {"store": 0.0, "load": 0.0}
+    for op in moved:
+        for event, price in kernel.prices.items():
+            if f"{op}_bytes" in price:
+                moved[op] += price[f"{op}_bytes"] * float(work.table[:, work.events[event]].sum())
+    return [Stream(f"{work.kernel} local", op, round(size), round(size)) for op, size in moved.items() if size]
 
 
 @cache
@@ -211,7 +228,8 @@ def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, li
         for event, price in prices.items()
         for column, part in _fitted_parts(price, about[event][0]).items()
     }
-    return KernelMix(kernel, int(table.get("registers", 16)), int(table.get("shared_bytes", 0)), prices, about, fitted)
+    registers, shared_bytes = int(table.get("registers", 16)), int(table.get("shared_bytes", 0))
+    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, bool(table.get("uncached_local")))
 
 
 def _fitted_parts(price: dict[str, Any], kind: str) -> dict[str, float]:

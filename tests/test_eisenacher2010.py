@@ -88,34 +88,39 @@ def test_table_2_is_predicted_on_other_screens_and_models_and_not_on_the_frame_o
     cells = by_place(small("table2"))
     assert cells["killeroo 512x512 BB 4", "1 spp"].status == "predicted"
     assert cells["teapot 1600x1200 BB 4", "1 spp"].status == "predicted"  # but for its view, which is not drawn here
-    assert cells["killeroo 1600x1200 BB 4", "1 spp"].status == "partly fitted"
-    assert numbers(cells["killeroo 1600x1200 BB 8", "4 spp"]).keys() >= {"EXAMINE_WARPS.fp32"}
+    assert numbers(cells["killeroo 512x512 BB 4", "1 spp"]) == {}
+    assert numbers(cells["killeroo 1600x1200 BB 4", "1 spp"]) != {}
+    assert numbers(cells["killeroo 1600x1200 BB 8", "4 spp"]).keys() >= {"Z_LANES.int32"}
 
 
 def test_table_3_is_fitted_where_a_number_was_chosen():
     cells = by_place(small("table3"))
-    chosen = [("system overhead", "1 spp"), ("bound and split", "1 spp"), ("setup", "1 spp")]
-    chosen += [("sampling", "16 spp"), ("sampling", "hybrid")]
+    chosen = [("system overhead", "1 spp"), ("setup", "1 spp")]
+    chosen += [("sampling", "4 spp"), ("sampling", "16 spp"), ("sampling", "hybrid")]
     assert {cells[place].status for place in chosen} == {"fitted"}
+
+
+def test_table_3_bound_and_split_is_derived_by_hand():
+    cells = by_place(small("table3"))
+    assert "EXAMINE_WARPS" not in str(cells["bound and split", "1 spp"].fitted_by)
 
 
 def test_table_3_the_hybrids_total_says_what_of_it_is_fitted():
     cell = by_place(small("table3"))["total", "hybrid"]
-    assert cell.status != "predicted"
-    assert numbers(cell).keys() >= {"per_clock.primitives", "EXAMINE_WARPS.fp32", "milliseconds of system overhead"}
+    assert numbers(cell).keys() >= {"per_clock.primitives", "milliseconds of system overhead"}
 
 
 def test_table_3_the_hybrids_bound_and_split_is_that_of_the_software():
     cells = by_place(small("table3"))
     hybrid, software = cells["bound and split", "hybrid"], cells["bound and split", "1 spp"]
-    assert hybrid.status == "fitted"
+    assert hybrid.ours == software.ours
     assert hybrid.fitted_by == software.fitted_by
     assert hybrid.of == (("bound and split", "1 spp"),)
 
 
-def test_table_3_samplings_follow_the_edge_set_up():
+def test_table_3_samplings_follow_what_lanes_cost_that_pass_the_z_test():
     cells = by_place(small("table3"))
-    assert all("EDGE_SETUP_WARPS.fp32" in numbers(cells["sampling", f"{spp} spp"]) for spp in (4, 16))
+    assert all("Z_LANES.int32" in numbers(cells["sampling", f"{spp} spp"]) for spp in (1, 4, 16))
 
 
 def test_table_3_counts_totals_and_ratios_once():
@@ -146,5 +151,4 @@ def test_figure_4_names_an_order_of_its_three_tiles_at_each_zoom():
 
 def test_claims_average_no_cell_that_was_fitted():
     result = small("claims")
-    assert result.predicted_errors == []
-    assert by_place(result)["box tests", "share of total time saved"].status == "fitted"
+    assert by_place(result)["box tests", "share of total time saved"].status != "fitted"

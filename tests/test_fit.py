@@ -240,14 +240,12 @@ def test_an_altered_number_is_no_longer_the_fitted_one(frame):
 
 
 def test_a_number_of_a_mix_moves_the_instructions_of_a_run(frame):
-    before = frame.stages.loc["bound_and_split", "instructions"]
-    oracle = next(work for work in frame.frame.works if work.kernel == "oracle")
-    warps = oracle.counts()["EXAMINE_WARPS"]
-    examined = sum(work.counts().get("EXAMINE_WARPS", 0) for work in frame.frame.works)
-    with moving("micropolygon/cc1: oracle.EXAMINE_WARPS.fp32"):
-        after = frame.stages.loc["bound_and_split", "instructions"]
-    assert warps > 0
-    assert after - before == pytest.approx(3000 * STEP * examined)
+    before = frame.stages.loc["tile_raster", "instructions"]
+    with moving("micropolygon/cc1: tile_raster.Z_LANES.int32"):
+        after = frame.stages.loc["tile_raster", "instructions"]
+    lanes = frame.counts["tile_raster.Z_LANES"]
+    assert lanes > 0
+    assert after - before == pytest.approx(61 * STEP * lanes, abs=1)
 
 
 def test_only_the_fitted_part_of_a_price_is_moved():

@@ -8,6 +8,9 @@ import pytest
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import MachineEvent
+from tilestamp.models.launch import Stream
+from tilestamp.models.machine import load_machine
+from tilestamp.models.traffic import traffic
 from tilestamp.simulator.mix import MIXES, PROVENANCES, KernelMix, Mix, load_mix
 from tilestamp.simulator.work import Work
 
@@ -74,6 +77,25 @@ def test_a_launch_has_the_works_shape_and_the_mixs_prices():
     assert (launch.registers, launch.shared_bytes, launch.grid, launch.block) == (21, 116, 2, 64)
     columns = [MachineEvent.FP32, MachineEvent.SHARED, MachineEvent.LANES, MachineEvent.LOAD_TRANSACTIONS]
     assert launch.events[:, columns].tolist() == [[3, 2, 5 * 32, 5], [6, 4, 10 * 32, 7]]
+
+
+LOCAL_PRICES = {"STEPS": {"load_bytes": 256, "store_bytes": 128}}
+LOCAL = Mix("p/cc1", {"k": KernelMix("k", 16, 0, LOCAL_PRICES, {}, uncached=True)}, "")
+FIVE_STEPS = {"stage": "s", "kernel": "k", "events": Event, "table": np.array([[5, 160, 0]]), "grid": 1, "block": 32}
+
+
+def test_local_memory_is_a_buffer_of_the_launch_where_l1_does_not_hold_it():
+    own = Stream("points", "load", 64, 64)
+    held = Mix("p/cc8", {"k": KernelMix("k", 16, 0, LOCAL_PRICES, {})}, "")
+    assert held.launch(Work(**FIVE_STEPS, streams=(own,)), 32).streams == (own,)
+    streams = LOCAL.launch(Work(**FIVE_STEPS, streams=(own,)), 32).streams
+    assert streams == (own, Stream("k local", "store", 640, 640), Stream("k local", "load", 1280, 1280))
+
+
+def test_local_memory_goes_to_dram_where_there_is_no_cache():
+    launches = [LOCAL.launch(Work(**FIVE_STEPS, streams=s), 32) for s in ((), (Stream("points", "load", 64, 64),))]
+    moved = [traffic([launch], load_machine("gtx280"))[0].dram_bytes for launch in launches]
+    assert moved == [5 * 384, 5 * 384 + 64]
 
 
 def test_a_variant_with_a_table_of_its_own_takes_that():

@@ -94,10 +94,14 @@ def _notes(table: "pd.DataFrame") -> list[str]:
         "Nearest view: " + "; ".join(lines_) + ".",
         (
             f"4x4 against 8x8: {near.loc['4x4', 'ms'] / near.loc['8x8', 'ms'] - 1:+.1%}. Small tiles need fewer quad "
-            "iterations "
-            "a pixel but four times the blocks; the paper gives the block scheduler as the reason why they lose."
+            "iterations a pixel, but four times the blocks. Those start one by one: while long blocks fill all places "
+            "none does, and while empty ones start SMs run dry. The paper, too, names the block scheduler."
         ),
-        "The paper prints no numbers for this figure; its zoom levels are assumed.",
+        (
+            "The paper prints no numbers for this figure; its zoom levels are assumed. From much nearer (0.8 of the "
+            "distance) 4x4 tiles win in ours, farther than the last level they fall behind 16x16: starting 120,000 "
+            "blocks takes 33 ms."
+        ),
     ]
 
 
