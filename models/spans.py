@@ -106,21 +106,21 @@ def _record(
     units = len(alone)
     free, free_who = tournament(places if units > places else 1)
     served, served_who = tournament(min(sms, units))
-    drawn = 0.0
+    drawn, begun = 0.0, -interval
     for i in range(units):
-        begun = i * interval
+        begun += interval
         where[i] = i
         if i >= places:
             begun = max(begun, free[0])
         if units > places:
             where[i] = free_who[0]
-        begins[i] = begun
+        begins[i] = begin = begun
         done = max(served[0], begun + start) + sm[i]
         replay(served, served_who, done)
         if len(draws) > 0:
             drawn = max(drawn, begun) + draws[i]
-            begun = drawn
-        ends[i] = max(done, begun + alone[i])
+            begin = drawn
+        ends[i] = max(done, begin + alone[i])
         if units > places:
             replay(free, free_who, ends[i])
 

@@ -22,9 +22,9 @@ ROUNDING = 1e-6
 
 def naive(units, alone, places):
     """Start and end of each unit: heaps of places and SMs, the soonest taken each time."""
-    free, served, drawn, found = [0.0] * places, [0.0] * units.sms, 0.0, []
+    free, served, drawn, found, begun = [0.0] * places, [0.0] * units.sms, 0.0, [], -units.interval
     for i, sm in enumerate(units.sm):
-        begun = max(free[0], i * units.interval)
+        begun = max(free[0], begun + units.interval)
         done = max(served[0], begun + units.start) + sm
         begin = begun
         if len(units.draws):
