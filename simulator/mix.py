@@ -17,7 +17,8 @@ What was fitted to measured cells says which of its columns were (``fitted = ["c
 where only so much of one was) and to which cells (``fitted_to``: ``tilestamp.models.fitted``, or the name of a list in
 the table ``fits`` of the file). Without ``fitted`` all columns of a table of provenance ``fitted`` were.
 
-``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp.
+``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp. L1
+holds it; with ``uncached_local = true`` in the kernel's table (compute capability 1.x) it is a buffer as others are.
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own. What it has in
 common with a table before it need not be said again: ``like = "tile_raster"``.
@@ -63,6 +64,8 @@ class KernelMix:
         By event name ("" for the kernel): (kind, source).
     fitted : dict
         By event and column: what was fitted of a price.
+    uncached : bool
+        Whether local memory passes L1 by.
     """
 
     kernel: str
@@ -71,6 +74,7 @@ class KernelMix:
     prices: dict[str, dict[str, Any]]
     provenance: dict[str, tuple[str, str]]
     fitted: dict[tuple[str, str], Fitted] = field(default_factory=dict)
+    uncached: bool = False
 
     @property
     def as_moved(self) -> "KernelMix":
@@ -171,14 +175,15 @@ def _add_up(matrix: Any, table: Any, events: Any) -> None:
 
 
 def _local_memory(kernel: KernelMix, work: Work) -> list[Stream]:
-    """Buffers that the mix adds to those of the stage: arrays of a thread; a work without buffers needs no more."""
-    totals = work.counts() if work.streams else {}
-
-    def local(op: Literal["load", "store"]) -> Stream:
-        moved = sum(price.get(f"{op}_bytes", 0.0) * totals.get(event, 0) for event, price in kernel.prices.items())
-        return Stream(f"{work.kernel} local", op, round(moved), round(moved))
-
-    return [stream for stream in (local("store"), local("load")) if stream.bytes]
+    """Local memory beside the buffers of the stage, where L1 does not hold it; a work without buffers needs no more."""
+    if not (kernel.uncached and work.streams):
+        return []
+    moved: dict[Literal["load", "store"], float] = {"store": 0.0, "load": 0.0}
+    for op in moved:
+        for event, price in kernel.prices.items():
+            if f"{op}_bytes" in price:
+                moved[op] += price[f"{op}_bytes"] * float(work.table[:, work.events[event]].sum())
+    return [Stream(f"{work.kernel} local", op, round(size), round(size)) for op, size in moved.items() if size]
 
 
 @cache
@@ -237,7 +242,8 @@ def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, li
         for event, price in prices.items()
         for column, part in _fitted_parts(price, about[event][0]).items()
     }
-    return KernelMix(kernel, int(table.get("registers", 16)), int(table.get("shared_bytes", 0)), prices, about, fitted)
+    registers, shared_bytes = int(table.get("registers", 16)), int(table.get("shared_bytes", 0))
+    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, bool(table.get("uncached_local")))
 
 
 def _fitted_parts(price: dict[str, Any], kind: str) -> dict[str, float]:

@@ -10,6 +10,7 @@ from tilestamp.experiments.eisenacher2010 import claims, figure4, frames, table1
 from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.write import draw_figure
+from tilestamp.models.machine import altered
 from tilestamp.simulator.run import Run
 
 EXPERIMENTS = (claims, figure4, table1, table2, table3)
@@ -152,3 +153,11 @@ def test_figure_4_names_an_order_of_its_three_tiles_at_each_zoom():
 def test_claims_average_no_cell_that_was_fitted():
     result = small("claims")
     assert by_place(result)["box tests", "share of total time saved"].status != "fitted"
+
+
+def test_8x8_tiles_are_fastest_and_16x16_slowest_where_the_gtx_280_starts_blocks_one_by_one():
+    """Figure 4, second zoom, with the killeroo or its stand-in; were blocks started at once, 4x4 would win."""
+    runs = {tile: frames.frame(tile=tile, view="zoom2") for tile in (4, 8, 16)}
+    assert sorted(runs, key=lambda tile: runs[tile].milliseconds) == [8, 4, 16]
+    at_once = altered(runs[4].machine, {"launch.blocks_per_us": 600.0}, "assumed", "test")
+    assert runs[4].on(at_once).milliseconds < runs[8].on(at_once).milliseconds

@@ -80,12 +80,15 @@ def test_a_launch_has_the_works_shape_and_the_mixs_prices():
     assert launch.events[:, columns].tolist() == [[3, 2, 5 * 32, 5], [6, 4, 10 * 32, 7]]
 
 
-LOCAL = Mix("p/cc1", {"k": KernelMix("k", 16, 0, {"STEPS": {"load_bytes": 256, "store_bytes": 128}}, {})}, "")
+LOCAL_PRICES = {"STEPS": {"load_bytes": 256, "store_bytes": 128}}
+LOCAL = Mix("p/cc1", {"k": KernelMix("k", 16, 0, LOCAL_PRICES, {}, uncached=True)}, "")
 FIVE_STEPS = {"stage": "s", "kernel": "k", "events": Event, "table": np.array([[5, 160, 0]]), "grid": 1, "block": 32}
 
 
-def test_local_memory_is_a_buffer_of_the_launch():
+def test_local_memory_is_a_buffer_of_the_launch_where_l1_does_not_hold_it():
     own = Stream("points", "load", 64, 64)
+    held = Mix("p/cc8", {"k": KernelMix("k", 16, 0, LOCAL_PRICES, {})}, "")
+    assert held.launch(Work(**FIVE_STEPS, streams=(own,)), 32).streams == (own,)
     streams = LOCAL.launch(Work(**FIVE_STEPS, streams=(own,)), 32).streams
     assert streams == (own, Stream("k local", "store", 640, 640), Stream("k local", "load", 1280, 1280))
 
