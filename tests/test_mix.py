@@ -172,3 +172,12 @@ def test_more_samples_never_take_less_time_on_the_h200():
     runs = [simulate("teapot", machine="h200", width=160, height=120, spp=spp) for spp in (1, 4, 16)]
     times = [run.stages.loc["tile_raster", "milliseconds"] for run in runs]
     assert times == sorted(times)
+
+
+@pytest.mark.parametrize(("machine", "words"), [("gtx280", 144), ("h200", 0)])
+def test_the_oracles_arrays_lie_in_memory_on_1_x(machine, words):
+    run = simulate("teapot", "micropolygon", machine=machine, width=80, height=60, picture=False)
+    oracles = [k for k, work in enumerate(run.frame.works) if work.kernel == "oracle"]
+    examined = sum(int(run.frame.works[k].counts()["EXAMINE_WARPS"]) for k in oracles)
+    local = [s for k in oracles for s in run.launches[k].streams if s.buffer == "oracle local"]
+    assert sum(s.bytes for s in local) == 2 * words * 128 * examined
