@@ -22,7 +22,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, THREADS_AN_SM, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
@@ -30,7 +30,6 @@ from tilestamp.simulator.work import Work
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
 FRAGMENT_WORDS = 11  # of 4 bytes, stored one by one
 FRAGMENT_POINTERS = 1  # of 8 bytes
-THREADS_AN_SM = 1024  # resident: 50 % of 2048, as 63 registers allow
 TEST_LOADS = 7  # the entry, and x and y of three vertices
 HIT_LOADS = 6  # z and w of three vertices
 NEARER_LOADS = 27  # eye position, normal, texture coordinate of three vertices; pointer, width and height
