@@ -135,6 +135,7 @@ def _add_traffic(events: NDArray[np.int64], simt: Simt) -> None:
         + textured * TEXTURE_LOADS
     )
     writes = written * WRITE_WORDS + textured * TEXTURE_WORDS
+    events[:, PerPrimitiveEvent.BLOCKS] = 1
     events[:, PerPrimitiveEvent.LOAD_TRANSACTIONS] = reads
     events[:, PerPrimitiveEvent.LOAD_BYTES] = reads * segment
     events[:, PerPrimitiveEvent.STORE_TRANSACTIONS] = writes

@@ -43,6 +43,7 @@ class PerPrimitiveEvent(IntEnum):
     TEXTURED_LANES = 25
     LONGEST_COLUMNS = 26  # most steps of a warp in which a lane ends a column
     LONGEST_TEXTURED = 27  # most steps of a warp in which a lane writes a fragment with a texture
+    BLOCKS = 28  # 1: what the start and end of a block's chain are priced on
 
 
 class Walkers(NamedTuple):

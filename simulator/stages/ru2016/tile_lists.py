@@ -123,6 +123,7 @@ def _scan(tiles: int, simt: Simt) -> Work:
 def _add_primitive_loads(events: NDArray[np.int64], simt: Simt) -> None:
     """Two words of three vertices 64 bytes apart, of primitives 200 bytes apart: every lane a segment of its own."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
+    events[:, TileListEvent.BLOCKS] = 1
     loads = events[:, TileListEvent.WARP_LANES] * COORDINATES
     events[:, TileListEvent.LOAD_TRANSACTIONS] += loads
     events[:, TileListEvent.LOAD_BYTES] += loads * segment

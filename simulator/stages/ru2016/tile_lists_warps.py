@@ -40,6 +40,7 @@ class TileListEvent(IntEnum):
     EDGE_LANES = 23
     LONGEST_ROWS = 24  # most rows, and most edges, of a warp
     LONGEST_EDGES = 25
+    BLOCKS = 26  # 1: what the start and end of a block's chain are priced on
 
 
 class TileWalkers(NamedTuple):
