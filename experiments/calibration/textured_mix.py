@@ -1,11 +1,11 @@
 """The instruction mixes of Ru 2016's pipelines on compute capability 9.0, written from machine code and fitted chains.
 
-    python -m tilestamp.experiments.calibration.textured_mix LISTING tiled > simulator/mixes/tiled/cc9.toml
-    python -m tilestamp.experiments.calibration.textured_mix LISTING per-primitive > simulator/mixes/per-primitive/cc9.toml
+    python -m tilestamp.experiments.calibration.textured_mix LISTING PIPELINE
 
-LISTING is ``cuobjdump -sass`` of ``experiments/cuda/textured.cu`` as nvcc 13.0.88 compiles it for sm_90 with default
-flags: our words for his kernels, which leave as many instructions of each event as his, but for ``FITTED``. Chains are
-fitted to the times of five scenes (``SCENES``), as the cycles of a kernel's longest warp.
+prints tables of ``simulator/mixes/tiled/cc9.toml`` or ``simulator/mixes/per-primitive/cc9.toml``. LISTING is
+``cuobjdump -sass`` of ``experiments/cuda/textured.cu`` as nvcc 13.0.88 compiles it for sm_90 with default flags: our
+words for his kernels, which leave as many instructions of each event as his, but for ``FITTED``. Chains are fitted to
+the times of five scenes (``SCENES``), as the cycles of a kernel's longest warp.
 """
 
 import sys
@@ -121,10 +121,10 @@ CHAINS: dict[str, dict[str, Price]] = {
         "LONGEST_APPENDS": {"cycles": 91.0, "chain_atomic": 1.0},
     },
     "tiled_raster": {
-        "BLOCKS": {"cycles": 200.0, "chain_load": 1.0},
-        "ENTRIES": {"cycles": 230.0, "chain_load": 1.0},
-        "LONGEST_HITS": {"cycles": 300.0},
-        "LONGEST_NEARER": {"cycles": 400.0, "chain_load": 1.0},
+        "BLOCKS": {"chain_load": 1.0},
+        "ENTRIES": {"cycles": 203.0, "chain_load": 1.0},
+        "LONGEST_HITS": {"cycles": 311.0},
+        "LONGEST_NEARER": {"cycles": 1302.0, "chain_load": 2.0},  # its loads wait behind the stores of other tiles
     },
     "per_primitive_raster": {
         "BLOCKS": {"cycles": 2000.0},
@@ -154,11 +154,12 @@ def prices(kernel: str, code: dict[int, sass.Block]) -> dict[str, Price]:
     lanes = LANES | ({"BOX_STEPS": "SAMPLE_TESTS"} if kernel == "per_primitive_raster" else {})
     out = event_prices(kernel, code, RUNS[kernel], {}, lanes, {"atomic"}, FITTED.get(kernel, {}), {})
     for event, chain in CHAINS.get(kernel, {}).items():
-        waited: dict[str, Any] = {"chain_alu": chain.get("cycles", 0.0) / ALU_CYCLES}
-        waited |= {name: value for name, value in chain.items() if name != "cycles"}
+        waited: dict[str, Any] = {name: value for name, value in chain.items() if name != "cycles"}
+        if "cycles" in chain:
+            waited["chain_alu"] = chain["cycles"] / ALU_CYCLES
         about: dict[str, Any] = {"provenance": "fitted", "source": "times of his kernel", "fitted_to": "times"}
-        about |= {"fitted": {"chain_alu": waited["chain_alu"]}}
-        out[event] = out.get(event, {}) | waited | (about if chain.get("cycles") else {})
+        about["fitted"] = {"chain_alu": waited.get("chain_alu", 0.0)}
+        out[event] = out.get(event, {}) | waited | (about if "cycles" in chain else {})
     return out
 
 

@@ -1,6 +1,7 @@
 """Clears of each frame (Ru 2016): the colours always; with tiles the list counters, else fragments and depth.
 
-Depth has a kernel of his own, a thread a pixel in blocks of 64; the others are the runtime's memset. A tile writes every fragment and depth of its pixels, so the tiled path has nothing else to clear.
+Depth has a kernel of his own, a thread a pixel in blocks of 64; the others are the runtime's memset. A tile writes
+every fragment and depth of its pixels, so the tiled path has nothing else to clear.
 """
 
 from tilestamp.models.simt import Simt

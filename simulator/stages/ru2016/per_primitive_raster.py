@@ -1,15 +1,15 @@
 """Per-primitive raster: one thread a triangle (Ru 2016's "basic" rasterization).
 
-Each thread walks the pixels of its triangle's box, column by column from the lowest row up: barycentric test, an integer ``atomicMin`` on the
-depth buffer, and if the value it returns was farther, the fragment is computed and written, **unprotected**: between
-the atomic and the write another thread may put a nearer depth and write its fragment first, and the farther one is
-then left standing.
+Each thread walks the pixels of its triangle's box, column by column, each from its lowest row up: barycentric test, an
+integer ``atomicMin`` on the depth buffer, and if the value it returns was farther, the fragment is computed and
+written, **unprotected**: between the atomic and the write another thread may put a nearer depth and write its fragment
+first, and the farther one is then left standing.
 
-The race is modelled, not left to luck. All resident warps walk in lockstep, one box step each a round; the lanes of a
-warp meet again after each column of their boxes. The depth operations of a round happen warp after warp, lane after
-lane. A fragment lands some rounds after its atomic: 1 to ``RACE_ROUNDS``, by a hash of warp and step, as a scheduler
-would spread them. What stays is the fragment that lands last; a pixel is wrong if that is not the nearest one.
-``RACE_ROUNDS`` and the rounds themselves are assumptions.
+The race is modelled, not left to luck. All resident warps walk in lockstep, one box step each a round
+(``per_primitive_walk``). The depth operations of a round happen warp after warp, lane after lane. A fragment lands some
+rounds after its atomic: 1 to ``RACE_ROUNDS``, by a hash of warp and step, as a scheduler would spread them. What stays
+is the fragment that lands last; a pixel is wrong if that is not the nearest one. ``RACE_ROUNDS`` and the rounds
+themselves are assumptions.
 """
 
 from typing import NamedTuple

@@ -39,7 +39,7 @@ def edges_tried(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any,
 
 
 @kernel(error_model="numpy")
-def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> bool:
+def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> Any:
     """Whether a triangle and a square tile overlap: no axis of five separates them."""
     return edges_tried(x0, y0, x1, y1, x2, y2, left, top, size) == SEPARATED_BY_NONE
 
@@ -165,7 +165,7 @@ def _append(
     mesh: Any, frame: Any, boxes: Any, place: Any, room: int, limits: Any, sizes: Any, entries: Any,
     addresses: Any, places: Any, row: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """One step of a warp: each lane tests a tile of its box, from the lowest row up. Returns appends, and those lost."""
+    """One step of a warp: each lane tests a tile of its box, lowest row first. Returns appends, and those lost."""
     screen, triangles, _ = mesh
     width, _, tile, _ = frame
     across = (width + tile - 1) // tile

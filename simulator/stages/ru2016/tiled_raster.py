@@ -216,10 +216,11 @@ def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...]
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
-    """All lanes read the same words, a transaction each; fragments are stored in parts (``compiled``), 56 bytes apart."""
+    """All lanes read the same words, a transaction each; fragments are stored in parts, 56 bytes apart."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
     reads = (
-        events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
+        events[:, TiledRasterEvent.WARPS]  # the length of the list
+        + events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
         + events[:, TiledRasterEvent.HIT_WARPS] * HIT_LOADS
         + events[:, TiledRasterEvent.NEARER_WARPS] * words(simt).nearer
     )
