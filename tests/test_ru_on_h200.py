@@ -67,3 +67,14 @@ def test_instructions_and_sectors_of_both_pipelines(measured):
                     assert abs(row["error"]) < 0.05, row
                 if row["quantity"] in {"load sectors", "atomic sectors"}:
                     assert abs(row["error"]) < 0.05, row
+
+
+def test_pixels_that_are_wrong_in_every_frame_are_wrong_here(shared, monkeypatch):
+    """Without culling two triangles of one warp race in step: 216 of the 217 pixels of an H200's 100 frames."""
+    monkeypatch.setenv(VARIABLE, str(shared / "silicon/textured"))
+    frame = draw(read_measured("ru_Duck_fit"), "per_primitive_nocull")
+    ids = np.load(shared / "silicon/textured/measured/ids/ru_Duck_fit.npz")
+    always = ids["ppn_other_in_of_100_frames"][::-1] == 100
+    wrong = frame.frame.maps["pixels wrong by the race"] > 0
+    assert (np.count_nonzero(always), np.count_nonzero(wrong & always)) == (217, 216)
+    assert np.count_nonzero(wrong) < 1.1 * 230.7  # of a frame on average

@@ -6,9 +6,10 @@ written, **unprotected**: between the atomic and the write another thread may pu
 first, and the farther one is then left standing.
 
 The race is modelled, not left to luck. All resident warps walk in lockstep, one box step each a round
-(``per_primitive_walk``). The depth operations of a round happen warp after warp, lane after lane. A fragment lands some
-rounds after its atomic: 1 to ``RACE_ROUNDS``, by a hash of warp and step, as a scheduler would spread them. What stays
-is the fragment that lands last; a pixel is wrong if that is not the nearest one. ``RACE_ROUNDS`` and the rounds
+(``per_primitive_walk``). The depth operations of a round happen warp after warp, lane after lane. Lanes of one warp at
+the same pixel write together, and the lowest one's fragment stays: what an H200 draws wrong in every frame. Fragments
+of several warps land before the next round, at one of ``RACE_PLACES`` by a hash of warp and step, as a scheduler would
+spread them. A pixel is wrong if the fragment that lands last is not the nearest one. ``RACE_PLACES`` and the rounds
 themselves are assumptions.
 """
 
@@ -44,7 +45,7 @@ class Race(NamedTuple):
     triangles : ndarray, (H, W), int32
         Triangle of the fragment that landed last.
     landed : ndarray, (H, W), int64
-        Its round.
+        When: places of all rounds, counted on.
     """
 
     triangles: NDArray[np.int32]
