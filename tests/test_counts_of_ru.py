@@ -10,7 +10,8 @@ from tilestamp.simulator.scenes.texture import texture_chains
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import shading_work
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tile_lists import tile_lists
-from tilestamp.simulator.stages.ru2016.tile_lists_fill import overlaps
+from tilestamp.simulator.stages.ru2016.tile_lists_fill import edges_tried
+from tilestamp.simulator.stages.ru2016.tile_lists_warps import walkers
 from tilestamp.simulator.stages.ru2016.tiled_raster import tiled_raster
 from tilestamp.simulator.stages.thread_per_item import Access, ThreadEvent, thread_per_item
 
@@ -35,9 +36,12 @@ def soup(count=170, seed=6):
 def test_per_primitive_raster(culling, textured, simt):
     screen, triangles = soup()
     every = np.arange(len(triangles), dtype=np.int32)
-    options = {"culling": culling, "textured": textured}
-    _, (work,), _ = per_primitive_raster(screen, triangles, every, WIDTH, HEIGHT, simt, **options)
-    expected = naive_ru.per_primitive(screen, triangles, WIDTH, HEIGHT, simt, **options)
+    mapped = every % 3 == 0 if textured else None
+    _, (work,), _ = per_primitive_raster(
+        screen, triangles, every, WIDTH, HEIGHT, simt, culling=culling, textured=mapped
+    )
+    named = {tuple(map(int, t)) for t in triangles[::3]} if textured else set()
+    expected = naive_ru.per_primitive(screen, triangles, WIDTH, HEIGHT, simt, culling=culling, textured=named)
     assert nonzero(work.counts()) == nonzero(expected)
 
 
@@ -49,7 +53,8 @@ def test_tile_lists(culling, simt):
     _, (counting, _, filling), _ = tile_lists(
         screen, triangles, every, WIDTH, HEIGHT, simt, tile=8, culling=culling, capacity="safe"
     )
-    given = (screen, triangles, WIDTH, HEIGHT, 8, simt, overlaps)
+    order = walkers((len(triangles) + 128) // 32, 32).order.tolist()
+    given = (screen, triangles, WIDTH, HEIGHT, 8, simt, edges_tried, order)
     for work, fills in ((counting, False), (filling, True)):
         expected, _ = naive_ru.tile_lists(*given, culling=culling, filling=fills)
         assert nonzero(work.counts()) == nonzero(expected)
@@ -67,15 +72,15 @@ def test_tiled_raster(tile, simt):
     assert nonzero(counts) == nonzero(naive_ru.tiled_raster(screen, entries, WIDTH, HEIGHT, tile, simt))
 
 
-def test_a_tile_stores_fragments_word_by_word():
-    """8 x 8: rows of 8 fragments 56 bytes apart, a sector for each word or pointer."""
+def test_a_tile_stores_a_fragment_in_seven_pairs_of_words():
+    """8 x 8: rows of 8 fragments 56 bytes apart, a sector for each pair, as an H200 counts them."""
     screen, triangles = soup(1)
     lists, _, _ = tile_lists(
         screen, triangles, np.zeros(1, np.int32), 8, 8, HOPPER, tile=8, culling=True, capacity="safe"
     )
     _, (work,), _ = tiled_raster(screen, triangles, lists, 8, 8, HOPPER, tile=8)
     event = work.events
-    assert work.total(event.STORE_TRANSACTIONS) == 2 * (11 * 32 + 32 + 4)  # of 32 lanes; depth in 4 rows of 32 bytes
+    assert work.total(event.STORE_TRANSACTIONS) == 2 * (7 * 32 + 4)  # of 32 lanes; depth in 4 rows of 32 bytes
     assert work.total(event.STORE_BYTES) == 32 * work.total(event.STORE_TRANSACTIONS)
 
 
@@ -105,5 +110,6 @@ def test_shading_two_blocks_by_hand():
             "BLOCKS": 2, "WARPS": 4, "WARP_LANES": 128, "DRAWN_WARPS": 1, "DRAWN_LANES": 5, "DRAWN_BLOCKS": 1,
             "TEXTURED_WARPS": 1, "TEXTURED_LANES": 3, "TEXTURED_BLOCKS": 1,
             "LOAD_TRANSACTIONS": words + 3 * texels, "LOAD_BYTES": 32 * words + 128 * 3 * texels,
+            "ZERO_TEXELS": 3 * texels, "ZERO_LANES": 3 * 3 * texels,
             "STORE_TRANSACTIONS": 3 * 12, "STORE_BYTES": 3 * 12 * 32,  # 384 bytes of colours, three words a pixel
         }  # fmt: skip

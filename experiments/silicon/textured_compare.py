@@ -30,14 +30,14 @@ class Drawn:
     run : Run
     kernels : sequence of str
         The author's name of each launch of the run; "" where there was none.
-    counted_as : str
-        Configuration that bears further counters of the same frame.
+    counted_as : tuple of str
+        Configurations that bear further counters of the same frame.
     """
 
     config: str
     run: Run
     kernels: Sequence[str]
-    counted_as: str = ""
+    counted_as: tuple[str, ...] = ()
 
     @property
     def microseconds(self) -> list[float]:
@@ -59,7 +59,7 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
         timed = (drawn.config, kernel, instance, TIME_METRIC)
         if timed in measured.on_gpu:
             yield about | _entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
-        for config in filter(None, (drawn.config, drawn.counted_as)):
+        for config in (drawn.config, *drawn.counted_as):
             place = (config, kernel, instance)
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
             yield from (about | entry for entry in _counters(launch, counters, drawn))

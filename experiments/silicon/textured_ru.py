@@ -65,7 +65,7 @@ def drawn_frames(measured: Measured) -> Iterator[Drawn]:
     """Draw each configuration that was measured."""
     for config in measured.configs:
         frame = draw(measured, config)
-        counted_as = "tiled_t8_cull" if config == "tiled_t8_cull_original" else ""
+        counted_as = ("tiled_t8_cull", "vertex") if config == "tiled_t8_cull_original" else ()
         yield Drawn(config, frame, [kernel_name(work.kernel, frame) for work in frame.frame.works], counted_as)
 
 

@@ -65,7 +65,7 @@ def per_primitive(
     execute(clear, width, height, 0, simt)
     meant, raced = execute(
         per_primitive_raster, vertices.screen, mesh.triangles, drawable, width, height, simt,
-        culling=options.cull_backfaces, textured=bool((mesh.texture_ids >= 0).any()),
+        culling=options.cull_backfaces, textured=mesh.texture_ids >= 0,
         samples=options.samples,
     ).outputs  # fmt: skip
     dropped = len(scene.mesh.triangles) - len(drawable) if scene.mesh else 0

@@ -1,6 +1,7 @@
 """Clears of each frame (Ru 2016): the colours always; with tiles the list counters, else fragments and depth.
 
-A tile writes every fragment and depth of its pixels, so the tiled path has nothing else to clear.
+Depth has a kernel of his own, a thread a pixel in blocks of 64; the others are the runtime's memset. A tile writes
+every fragment and depth of its pixels, so the tiled path has nothing else to clear.
 """
 
 from tilestamp.models.simt import Simt
@@ -9,6 +10,7 @@ from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 
 BLOCK = 256  # threads of the runtime's memset, four words each (assumed)
+DEPTH_BLOCK = 64
 
 
 def clear(width: int, height: int, tiles: int, simt: Simt) -> StageResult[None]:
@@ -27,9 +29,12 @@ def clear(width: int, height: int, tiles: int, simt: Simt) -> StageResult[None]:
     works : one for each buffer
     """
     pixels = width * height
-    words = {"tile_counters": tiles} if tiles else {"fragments": pixels * FRAGMENT_BYTES // 4, "depth": pixels}
-    works = (
+    sizes = {"tile_counters": tiles} if tiles else {"fragments": pixels * FRAGMENT_BYTES // 4}
+    works = [
         thread_per_item("clear", f"clear_{buffer}", -(-count // 4), BLOCK, simt, stores=(Access(buffer, 16, 1, 16),))
-        for buffer, count in {**words, "colors": 3 * pixels}.items()
-    )
+        for buffer, count in {**sizes, "colors": 3 * pixels}.items()
+    ]
+    if not tiles:
+        depth = (Access("depth", 4, 1),)
+        works.insert(1, thread_per_item("clear", "clear_depth", pixels, DEPTH_BLOCK, simt, stores=depth))
     return StageResult(None, tuple(works))

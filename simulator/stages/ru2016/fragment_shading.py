@@ -16,6 +16,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes.texture import TextureChains, add_bilinear, nearest
 from tilestamp.simulator.scenes.textured_mesh import Geometry
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.ru2016.compiled import words
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners
@@ -193,10 +194,11 @@ def fragment_shading(
     )
     pixels = width * height
     colors = Access("colors", 12, 3)
+    window = tuple(Access("window", 4, 1, word_bytes=bytes_) for bytes_ in words(simt).window)
     drawn = visible.triangles >= 0
     textures = np.where(drawn, mesh.texture_ids[visible.triangles], np.int32(-1))
     works = (
         shading_work(drawn, textures, fragments.uvs, chains, texture_filter, simt),
-        thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), (Access("window", 4, 4, word_bytes=1),)),
+        thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), window),
     )
     return StageResult(image, works)

@@ -39,6 +39,8 @@ class FragmentShadingEvent(IntEnum):
     LOAD_BYTES = 10
     STORE_TRANSACTIONS = 11
     STORE_BYTES = 12
+    ZERO_TEXELS = 13  # colours of texels, by warp, of which a lane's is 0: its division by 255 takes the slow path
+    ZERO_LANES = 14
 
 
 def shading_work(
@@ -74,6 +76,8 @@ def shading_work(
         table[:, columns] = np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1), lanes.any(axis=1)], axis=1)
     lines, footprint = _texel_lines(textures, uvs, chains)
     texels = BILINEAR_TEXELS if texture_filter == "bilinear" else 1
+    zero = texels * _zeros(textures, uvs, chains).reshape(-1, 2, 2).sum(axis=1)
+    table[:, [event.ZERO_TEXELS, event.ZERO_LANES]] = zero
     texel_lines = texels * TEXEL_BYTES * lines.reshape(-1, 2).sum(axis=1)
     word = record_transactions(Access("fragments", FRAGMENT_BYTES, 1), simt)
     stored = record_transactions(Access("colors", 12, 3), simt)
@@ -114,6 +118,24 @@ def _by_warp(pixels: NDArray[Any]) -> NDArray[Any]:
     return halves.reshape(-1, SIDE * SIDE // 2)
 
 
+def _texels(textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains) -> NDArray[np.int64]:
+    """Nearest texel of each textured pixel."""
+    level = chains.levels[textures, 0].astype(np.int64)
+    texel = np.floor(np.mod(uvs, 1.0) * level[:, 1:]).astype(np.int64)
+    found: NDArray[np.int64] = level[:, 0] + texel[:, 1] * level[:, 1] + texel[:, 0]
+    return found
+
+
+def _zeros(textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains) -> NDArray[np.int64]:
+    """Colours of the nearest texel that are 0 in a lane, (warps, 2): how many of the three, and lanes."""
+    mapped = textures >= 0
+    zero = np.zeros((*textures.shape, TEXEL_BYTES), np.bool_)
+    if mapped.any():
+        zero[mapped] = chains.texels[_texels(textures[mapped], uvs[mapped], chains), :TEXEL_BYTES] == 0.0
+    lanes = np.stack([_by_warp(zero[:, :, c]).sum(axis=1) for c in range(TEXEL_BYTES)], axis=1)
+    return np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1)], axis=1)
+
+
 def _texel_lines(
     textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains
 ) -> tuple[NDArray[np.int64], int]:
@@ -121,9 +143,7 @@ def _texel_lines(
     mapped = textures >= 0
     line = np.zeros(textures.shape, np.int64)
     if mapped.any():
-        level = chains.levels[textures[mapped], 0].astype(np.int64)
-        texel = np.floor(np.mod(uvs[mapped], 1.0) * level[:, 1:]).astype(np.int64)
-        first = (level[:, 0] + texel[:, 1] * level[:, 1] + texel[:, 0]) * TEXEL_BYTES
+        first = _texels(textures[mapped], uvs[mapped], chains) * TEXEL_BYTES
         line[mapped] = 1 + first // LINE_BYTES
     warps = np.sort(_by_warp(line), axis=1)
     new = np.diff(warps, axis=1, prepend=0) != 0

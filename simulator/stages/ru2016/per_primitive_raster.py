@@ -1,15 +1,16 @@
 """Per-primitive raster: one thread a triangle (Ru 2016's "basic" rasterization).
 
-Each thread walks the pixels of its triangle's box, column by column: barycentric test, an integer ``atomicMin`` on the
-depth buffer, and if the value it returns was farther, the fragment is computed and written, **unprotected**: between
-the atomic and the write another thread may put a nearer depth and write its fragment first, and the farther one is
-then left standing.
+Each thread walks the pixels of its triangle's box, column by column, each from its lowest row up: barycentric test, an
+integer ``atomicMin`` on the depth buffer, and if the value it returns was farther, the fragment is computed and
+written, **unprotected**: between the atomic and the write another thread may put a nearer depth and write its fragment
+first, and the farther one is then left standing.
 
-The race is modelled, not left to luck. All resident warps walk in lockstep, one box step each a round; the lanes of a
-warp meet again after each column of their boxes. The depth operations of a round happen warp after warp, lane after
-lane. A fragment lands some rounds after its atomic: 1 to ``RACE_ROUNDS``, by a hash of warp and step, as a scheduler
-would spread them. What stays is the fragment that lands last; a pixel is wrong if that is not the nearest one.
-``RACE_ROUNDS`` and the rounds themselves are assumptions.
+The race is modelled, not left to luck. All resident warps walk in lockstep, one box step each a round
+(``per_primitive_walk``). The depth operations of a round happen warp after warp, lane after lane. Lanes of one warp at
+the same pixel write together, and the lowest one's fragment stays: what an H200 draws wrong in every frame. Fragments
+of several warps land before the next round, at one of ``RACE_PLACES`` by a hash of warp and step, as a scheduler would
+spread them. A pixel is wrong if the fragment that lands last is not the nearest one. ``RACE_PLACES`` and the rounds
+themselves are assumptions.
 """
 
 from typing import NamedTuple
@@ -23,8 +24,8 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
-from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
-from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, THREADS_AN_SM, Visible
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, THREADS_AN_SM
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, Visible
 from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, Samples
 from tilestamp.simulator.work import Work
 
@@ -44,7 +45,7 @@ class Race(NamedTuple):
     triangles : ndarray, (H, W), int32
         Triangle of the fragment that landed last.
     landed : ndarray, (H, W), int64
-        Its round.
+        When: places of all rounds, counted on.
     """
 
     triangles: NDArray[np.int32]
@@ -60,7 +61,7 @@ def per_primitive_raster(
     simt: Simt,
     *,
     culling: bool,
-    textured: bool = False,
+    textured: NDArray[np.bool_] | None = None,
     samples: Samples = "centers",
 ) -> StageResult[tuple[Visible, Race]]:
     """Draw triangle by triangle.
@@ -74,8 +75,8 @@ def per_primitive_raster(
         Pixels.
     simt : Simt
     culling : bool
-    textured : bool
-        Whether fragments carry texture coordinates.
+    textured : ndarray, (F,), bool, or None
+        Triangles whose fragments carry texture coordinates; None: none.
     samples : {"centers", "corners"}
         Where in its pixel a sample lies (``vertex_shading``).
 
@@ -86,6 +87,7 @@ def per_primitive_raster(
         leaves in this model.
     works : one, a row a block
     """
+    mapped = np.zeros(len(triangles), np.bool_) if textured is None else textured
     visible = np.full((height, width), -1, np.int32)
     depth = np.full((height, width), FAR, np.int32)
     race = Race(np.full((height, width), -1, np.int32), np.full((height, width), -1, np.int64))
@@ -94,16 +96,17 @@ def per_primitive_raster(
     requests = np.zeros(width * height // 8 + 1, np.int64)
     resident = simt.sms * (THREADS_AN_SM // simt.warp)
     walk(
-        (screen, triangles, drawable, SHIFTS[samples]),
+        (screen, triangles, drawable, SHIFTS[samples], mapped),
         culling,
         int(simt.atomic_merge),
         walkers(resident, simt.warp),
         (visible, depth, *race, requests),
         events,
     )
-    _add_traffic(events, simt, textured)
+    _add_traffic(events, simt)
     total = events.sum(axis=0)
-    stored = int(total[PerPrimitiveEvent.WRITE_LANES]) * (WRITE_WORDS + (TEXTURE_WORDS if textured else 0))
+    written, of_texture = total[[PerPrimitiveEvent.WRITE_LANES, PerPrimitiveEvent.TEXTURED_LANES]].tolist()
+    stored = written * WRITE_WORDS + of_texture * TEXTURE_WORDS
     streams = (
         Stream("primitives", "load", 3 * SECTOR_BYTES * len(drawable), 3 * SECTOR_BYTES * len(drawable)),
         Stream("depth", "atomic", 32 * int(total[PerPrimitiveEvent.ATOMIC_REQUESTS]), 4 * width * height),
@@ -117,21 +120,23 @@ def per_primitive_raster(
     )
     work = Work(
         stage="per_primitive_raster", kernel="per_primitive_raster", events=PerPrimitiveEvent, table=events,
-        grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests, variant="textured" if textured else "",
+        grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests,
     )  # fmt: skip
     return StageResult((Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race), (work,))
 
 
-def _add_traffic(events: NDArray[np.int64], simt: Simt, textured: bool) -> None:
+def _add_traffic(events: NDArray[np.int64], simt: Simt) -> None:
     """Each lane reads its own primitive and writes its own fragment, a segment of its own for each word."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
-    words = WRITE_WORDS + (TEXTURE_WORDS if textured else 0)
+    written, textured = events[:, PerPrimitiveEvent.WRITE_LANES], events[:, PerPrimitiveEvent.TEXTURED_LANES]
     reads = (
         events[:, PerPrimitiveEvent.WARP_LANES] * START_LOADS
         + events[:, PerPrimitiveEvent.ATOMIC_LANES] * HIT_LOADS
-        + events[:, PerPrimitiveEvent.WRITE_LANES] * (WRITE_LOADS + (TEXTURE_LOADS if textured else 0))
+        + written * WRITE_LOADS
+        + textured * TEXTURE_LOADS
     )
-    writes = events[:, PerPrimitiveEvent.WRITE_LANES] * words
+    writes = written * WRITE_WORDS + textured * TEXTURE_WORDS
+    events[:, PerPrimitiveEvent.BLOCKS] = 1
     events[:, PerPrimitiveEvent.LOAD_TRANSACTIONS] = reads
     events[:, PerPrimitiveEvent.LOAD_BYTES] = reads * segment
     events[:, PerPrimitiveEvent.STORE_TRANSACTIONS] = writes

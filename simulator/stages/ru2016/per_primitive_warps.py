@@ -35,6 +35,15 @@ class PerPrimitiveEvent(IntEnum):
     LONGEST = 17  # most steps of a warp: the dependent chain of the block
     LONGEST_HITS = 18  # most steps of a warp in which a lane hits
     LONGEST_WRITES = 19  # most steps of a warp in which a lane writes
+    FRONT_WARPS = 20  # warps with a triangle that is not culled
+    FRONT_LANES = 21
+    COLUMN_STEPS = 22  # warp steps in which a lane ends a column of pixels
+    COLUMN_LANES = 23
+    TEXTURED_WRITES = 24  # warp steps in which a lane writes a fragment with a texture
+    TEXTURED_LANES = 25
+    LONGEST_COLUMNS = 26  # most steps of a warp in which a lane ends a column
+    LONGEST_TEXTURED = 27  # most steps of a warp in which a lane writes a fragment with a texture
+    BLOCKS = 28  # 1: what the start and end of a block's chain are priced on
 
 
 class Walkers(NamedTuple):
@@ -42,24 +51,21 @@ class Walkers(NamedTuple):
 
     Parameters
     ----------
-    boxes : ndarray, (W, L, 5), int64
-        Of each lane: left, columns, top, rows, triangle.
+    boxes : ndarray, (W, L, 7), int64
+        Of each lane: left column, columns, lowest row (rows count down), rows, triangle; column and row that it is at.
     shapes : ndarray, (W, L, 10), float32
         Of each lane's triangle: corners, one over its area, depths.
-    place : ndarray, (W, 4), int64
-        Column and row that the warp is at, rows and lanes of the column.
-    present : ndarray, (W, L), int64
-        Those lanes.
-    seen : ndarray, (W, 3), int64
-        Steps, steps with a hit, steps with a write.
+    steps : ndarray, (W,), int64
+        That the warp takes.
+    seen : ndarray, (W, 5), int64
+        Steps so far, those with a hit, with a write, with one with a texture, with the end of a column.
     pixels, who, wins : ndarray, (L,), int64, int64, bool
         Of each lane that hits now: its pixel, its number, whether it lowered the depth.
     """
 
     boxes: Any
     shapes: Any
-    place: Any
-    present: Any
+    steps: Any
     seen: Any
     pixels: Any
     who: Any
@@ -69,11 +75,10 @@ class Walkers(NamedTuple):
 def walkers(warps: int, lanes: int) -> Walkers:
     """Make room for the resident warps."""
     return Walkers(
-        np.zeros((warps, lanes, 5), np.int64),
+        np.zeros((warps, lanes, 7), np.int64),
         np.zeros((warps, lanes, 10), np.float32),
-        np.zeros((warps, 4), np.int64),
-        np.zeros((warps, lanes), np.int64),
-        np.zeros((warps, 3), np.int64),
+        np.zeros(warps, np.int64),
+        np.zeros((warps, 5), np.int64),
         np.zeros(lanes, np.int64),
         np.zeros(lanes, np.int64),
         np.zeros(lanes, np.bool_),

@@ -2,7 +2,8 @@
 
 One thread a triangle (128 a block): cull back faces, walk the tiles of the box row by row, test each by a separating
 axis test on five axes (two of the tile, three of the triangle), and append with **one global atomicAdd for each
-(triangle, tile)** and a 4-byte store. A warp walks in lockstep: its lanes meet again after each row of their boxes.
+(triangle, tile)** and a 4-byte store. A warp walks in lockstep: its lanes meet again after each row of their boxes; so
+do all resident warps, which is what sets the order of the entries (``tile_lists_fill``).
 
 The original gives each tile room for all triangles if there are at most 100, else for a tenth of them, and does not
 check for overflow. Here an overflow is dropped and reported; the default counts first, scans, and then fills.
@@ -17,7 +18,8 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.ru2016.tile_lists_fill import BLOCK, TileListEvent, fill
+from tilestamp.simulator.stages.ru2016.tile_lists_fill import fill
+from tilestamp.simulator.stages.ru2016.tile_lists_warps import BLOCK, TileListEvent, walkers
 from tilestamp.simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.work import Work
@@ -25,6 +27,7 @@ from tilestamp.simulator.work import Work
 SCAN_BLOCK = 256  # threads (ours: the original has no scan)
 SMALL_MODEL = 100  # triangles up to which a list can hold all of them
 COORDINATES = 6  # words read of each primitive: x and y of its corners
+THREADS_AN_SM = 1024  # resident: 50 % of 2048, as 63 registers allow
 SECTOR_BYTES = 32  # loads of compute capability 3.0 pass by L1 and move such sectors
 Capacity = Literal["safe", "original"]
 
@@ -80,7 +83,12 @@ def tile_lists(
     """
     tiles = -(-width // tile) * -(-height // tile)
     blocks = max(1, -(-len(drawable) // BLOCK))
-    shape = (screen, triangles, drawable, width, height, tile, culling, simt.warp, int(simt.coalescing))
+    given = (
+        (screen, triangles, drawable),
+        (width, height, tile, culling),
+        (int(simt.coalescing), int(simt.atomic_merge)),
+        walkers(min(simt.sms * THREADS_AN_SM, len(drawable) + BLOCK) // simt.warp, simt.warp),
+    )
 
     room = 0  # where lists have a fixed room, they lie that far apart; only the entries that fit are kept here
     if capacity == "original":
@@ -90,7 +98,7 @@ def tile_lists(
         events = np.zeros((blocks, len(TileListEvent)), np.int64)
         requests = np.zeros(tiles // 8 + 1, np.int64)
         sizes = np.zeros(tiles, np.int64)
-        lost = fill(*shape, int(simt.atomic_merge), room, limits, sizes, entries, requests, events)
+        lost = fill(*given, room, limits, sizes, entries, requests, events)
         _add_primitive_loads(events, simt)
         return sizes, lost, Work(
             stage="tile_lists", kernel=kernel, events=TileListEvent, table=events, grid=blocks, block=BLOCK,
@@ -115,6 +123,7 @@ def _scan(tiles: int, simt: Simt) -> Work:
 def _add_primitive_loads(events: NDArray[np.int64], simt: Simt) -> None:
     """Two words of three vertices 64 bytes apart, of primitives 200 bytes apart: every lane a segment of its own."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
+    events[:, TileListEvent.BLOCKS] = 1
     loads = events[:, TileListEvent.WARP_LANES] * COORDINATES
     events[:, TileListEvent.LOAD_TRANSACTIONS] += loads
     events[:, TileListEvent.LOAD_BYTES] += loads * segment

@@ -22,18 +22,15 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
+from tilestamp.simulator.stages.ru2016.compiled import words
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, THREADS_AN_SM, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
-FRAGMENT_WORDS = 11  # of 4 bytes, stored one by one
-FRAGMENT_POINTERS = 1  # of 8 bytes
-THREADS_AN_SM = 1024  # resident: 50 % of 2048, as 63 registers allow
 TEST_LOADS = 7  # the entry, and x and y of three vertices
 HIT_LOADS = 6  # z and w of three vertices
-NEARER_LOADS = 27  # eye position, normal, texture coordinate of three vertices; pointer, width and height
 FAR = np.float32(1.0)
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
@@ -59,6 +56,9 @@ class TiledRasterEvent(IntEnum):
     STORE_BYTES = 12
     LONGEST_HITS = 13  # depth tests of the warp that makes most
     LONGEST_NEARER = 14  # interpolations of the warp that makes most
+    BLOCKS = 15  # 1: what the start and end of a block's chain are priced on
+    LISTED_WARPS = 16  # warps of a tile whose list is not empty
+    LISTED_LANES = 17
 
 
 class Visible(NamedTuple):
@@ -135,6 +135,9 @@ def _band(
             events[i, TiledRasterEvent.TEST_WARPS] = warps * len(listed)
             events[i, TiledRasterEvent.SAMPLE_TESTS] = tile * tile * len(listed)
             events[i, TiledRasterEvent.ENTRIES] = len(listed)
+            events[i, TiledRasterEvent.BLOCKS] = 1
+            events[i, TiledRasterEvent.LISTED_WARPS] = warps * min(len(listed), 1)
+            events[i, TiledRasterEvent.LISTED_LANES] = tile * tile * min(len(listed), 1)
             events[i, TiledRasterEvent.LONGEST_HITS] = marks[2].max()
             events[i, TiledRasterEvent.LONGEST_NEARER] = marks[3].max()
             marks[:] = 0
@@ -188,10 +191,10 @@ def tiled_raster(
     streams = (  # of a primitive, what the first warp of a block fetches: the others find it in L2
         Stream("tile_lists", "load", SECTOR_BYTES * entries, 4 * entries),
         Stream("primitives", "load", 3 * SECTOR_BYTES * entries, drawn * 3 * SECTOR_BYTES),
-        Stream(  # a store of 4 bytes takes a sector of L2, where the words of a fragment meet
+        Stream(  # each store takes a sector of L2, where the words of a fragment meet
             "fragments",
             "store",
-            width * height * ((FRAGMENT_WORDS + FRAGMENT_POINTERS) * SECTOR_BYTES + 4),
+            width * height * (len(words(simt).fragment) * SECTOR_BYTES + 4),
             width * height * (FRAGMENT_BYTES + 4),
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
         ),
@@ -213,24 +216,20 @@ def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...]
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
-    """All lanes read the same words, a transaction each; fragments are stored word by word, 56 bytes apart."""
+    """All lanes read the same words, a transaction each; fragments are stored in parts, 56 bytes apart."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
     reads = (
-        events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
+        events[:, TiledRasterEvent.WARPS]  # the length of the list
+        + events[:, TiledRasterEvent.TEST_WARPS] * TEST_LOADS
         + events[:, TiledRasterEvent.HIT_WARPS] * HIT_LOADS
-        + events[:, TiledRasterEvent.NEARER_WARPS] * NEARER_LOADS
+        + events[:, TiledRasterEvent.NEARER_WARPS] * words(simt).nearer
     )
     lanes = np.where(np.arange(simt.warp) < tile * tile, np.arange(simt.warp), -1)
     addresses = np.where(lanes >= 0, (lanes // tile * 800 + lanes % tile) * FRAGMENT_BYTES, -1)
-    count, size = (
-        FRAGMENT_WORDS * words + FRAGMENT_POINTERS * pointers + depths
-        for words, pointers, depths in zip(
-            transactions(addresses, simt.warp, 4, int(simt.coalescing)),
-            transactions(addresses, simt.warp, 8, int(simt.coalescing)),
-            transactions(addresses // FRAGMENT_BYTES * 4, simt.warp, 4, int(simt.coalescing)),
-            strict=True,
-        )
-    )
+    rule = int(simt.coalescing)
+    stores = [transactions(addresses, simt.warp, bytes_, rule) for bytes_ in words(simt).fragment]
+    stores.append(transactions(addresses // FRAGMENT_BYTES * 4, simt.warp, 4, rule))
+    count, size = (sum(part) for part in zip(*stores, strict=True))
     writes = events[:, TiledRasterEvent.WARPS]
     events[:, TiledRasterEvent.LOAD_TRANSACTIONS] = reads
     events[:, TiledRasterEvent.LOAD_BYTES] = reads * segment

@@ -27,6 +27,9 @@ from tilestamp.simulator.work import Work
 
 BLOCK = 128  # threads
 VERTEX_BYTES = 64  # position, eye position, eye normal, texture coordinate, texture pointer and size
+VERTEX_WORDS = 15  # the pointer goes as one
+PLAIN_STORES = 11  # of a vertex: position, eye position, normal, size
+TEXTURE_STORES = 3  # coordinate, pointer
 PRIMITIVE_BYTES = 3 * VERTEX_BYTES + 8  # three vertices and a type, padded to the alignment of the pointers
 INDEX_BYTES = 2
 Samples = Literal["centers", "corners"]
@@ -138,14 +141,20 @@ def vertex_shading(
         SHIFTS[samples],
         *out,
     )
-    sizes = [count] if parts is None else parts[:, 0].tolist()
-    return StageResult(out, tuple(_shading_work(size, i, simt) for i, size in enumerate(sizes)))
+    draws = np.array([[count, len(mesh.triangles)]]) if parts is None else parts
+    ends = np.cumsum(draws[:, 1])
+    textured = [bool((mesh.texture_ids[end - n : end] >= 0).any()) for n, end in zip(draws[:, 1], ends, strict=True)]
+    sizes = draws[:, 0].tolist()
+    return StageResult(out, tuple(_shading_work(sizes[i], i, textured[i], simt) for i in range(len(sizes))))
 
 
-def _shading_work(count: int, part: int, simt: Simt) -> Work:
-    loads = (Access(f"positions {part}", 12, 3), Access(f"normals {part}", 12, 3), Access(f"uvs {part}", 8, 2))
-    stores = (Access(f"vertices {part}", VERTEX_BYTES, VERTEX_BYTES // 4),)
-    return thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, loads, stores)
+def _shading_work(count: int, part: int, textured: bool, simt: Simt) -> Work:
+    loads = [Access(f"positions {part}", 12, 3), Access(f"normals {part}", 12, 3)]
+    if textured:
+        loads.append(Access(f"uvs {part}", 8, 2))
+    stored = PLAIN_STORES + (TEXTURE_STORES if textured else 0)
+    stores = (Access(f"vertices {part}", VERTEX_BYTES, stored),)
+    return thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, tuple(loads), stores)
 
 
 def primitive_assembly(
@@ -184,7 +193,7 @@ def shaded_primitives(
 
 
 def _assembly_work(indices: int, part: int, simt: Simt) -> Work:
-    vertices = Access(f"vertices {part}", VERTEX_BYTES, VERTEX_BYTES // 4)
+    vertices = Access(f"vertices {part}", VERTEX_BYTES, VERTEX_WORDS)
     loads = (Access(f"indices {part}", INDEX_BYTES, 1), vertices)
-    stores = (Access("primitives", PRIMITIVE_BYTES // 3, VERTEX_BYTES // 4),)
+    stores = (Access("primitives", PRIMITIVE_BYTES // 3, VERTEX_WORDS),)
     return thread_per_item("primitive_assembly", "primitive_assembly", indices, BLOCK, simt, loads, stores)

@@ -1,0 +1,37 @@
+"""What compilers make of the records of Ru's kernels: memory instructions, where the source says copies of structures.
+
+His source copies a fragment of 56 bytes and writes a pixel of the window byte by byte. The compiler of 2016 for
+compute capability 3.x is taken to have done it word by word; nvcc 13 for 9.0 joins words that lie side by side where
+it knows their alignment (machine code, and the sectors that an H200 counts). The rule of coalescing tells them apart.
+"""
+
+from typing import NamedTuple
+
+from tilestamp.models.simt import Coalescing, Simt
+
+
+class Words(NamedTuple):
+    """Memory instructions of a warp.
+
+    Parameters
+    ----------
+    fragment : tuple of int
+        Bytes of each store of a fragment.
+    window : tuple of int
+        Bytes of each store of a pixel of the window.
+    nearer : int
+        Loads of the attributes of a triangle that is nearer.
+    """
+
+    fragment: tuple[int, ...]
+    window: tuple[int, ...]
+    nearer: int
+
+
+OLD = Words(fragment=(4,) * 11 + (8,), window=(1,) * 4, nearer=27)
+NEW = Words(fragment=(8,) * 7, window=(4,), nearer=26)
+
+
+def words(simt: Simt) -> Words:
+    """Memory instructions of the compiler for such a machine."""
+    return NEW if simt.coalescing == Coalescing.WARP_SECTORS else OLD
