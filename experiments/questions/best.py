@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.questions.space import numbers
 from tilestamp.models.errors import TilestampError
@@ -94,7 +95,7 @@ def boundaries(
     return found
 
 
-def _zero(at: Any, ratio: Any) -> float:
+def _zero(at: NDArray[np.float64], ratio: NDArray[np.float64]) -> float:
     """Place between two numbers where a ratio's logarithm crosses 0; the middle where one has none."""
     share = ratio[0] / (ratio[0] - ratio[1]) if np.isfinite(ratio).all() and ratio[0] != ratio[1] else 0.5
     if at[0] > 0:

@@ -13,6 +13,7 @@ from tilestamp.models.errors import TilestampError
 
 if TYPE_CHECKING:
     import pandas as pd
+    from optuna.trial import Trial
 
 TOGETHER = 8  # points of one question: executed and priced together
 
@@ -76,7 +77,7 @@ def search(
     return pd.DataFrame(rows).assign(best=[number in best for number in range(len(rows))])
 
 
-def _share(trial: Any, name: str, length: int) -> float:
+def _share(trial: "Trial", name: str, length: int) -> float:
     """Ask for a point of one axis: anywhere in a range, or in the middle of a value's part."""
     if not length:
         return float(trial.suggest_float(name, 0.0, 1.0))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from tilestamp.experiments.studies.places import place
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies.values import is_whole
 from tilestamp.models.errors import TilestampError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,7 @@ def values_at(
     return numbers(table, names), [str(problem) for problem in problems]
 
 
-def numbers(table: Any, names: Sequence[str]) -> NDArray[np.float64]:
+def numbers(table: "pd.DataFrame", names: Sequence[str]) -> NDArray[np.float64]:
     """Columns of a table as numbers, (rows, names).
 
     Raises
