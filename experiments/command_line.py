@@ -81,6 +81,7 @@ def _app(arguments: list[str]) -> "App":
     """Put the commands together; ``render`` has the flags of the pipeline that the arguments name."""
     from cyclopts import App
 
+    from tilestamp.experiments.commands.ask import ask
     from tilestamp.experiments.commands.catalogue import catalogue
     from tilestamp.experiments.commands.compare import compare
     from tilestamp.experiments.commands.measure_machine import measure_machine
@@ -99,7 +100,7 @@ def _app(arguments: list[str]) -> "App":
     )
     draws = arguments[:1] == ["render"]
     app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
-    for command in (compare, study, reproduce, validate, measure_machine):
+    for command in (compare, study, ask, reproduce, validate, measure_machine):
         app.command(command)
     app.command(catalogue, name="list")
     return app

@@ -58,7 +58,7 @@ def study(
     try:
         with closing(Store(path, create=False)) as kept:  # nothing is written before all is known to be right
             asked = read.study(kept)
-            _agree(len(asked), yes=yes or dry_run)
+            agree(len(asked), yes=yes or dry_run)
             with progress("looking at the study"):
                 expected = asked.forecast(jobs)
         sys.stdout.write(f"{asked.title or file.stem}: {expected.sentence()}\n")
@@ -72,7 +72,7 @@ def study(
     except StudyError as error:
         raise read.placed(error) from None
     sys.stdout.writelines(f"{sentence}\n" for sentence in (*summary.changed, *summary.sentences()))
-    _print(table, asked.title or file.stem)
+    print_rows(table, asked.title or file.stem)
     if output is not None:
         export(table, output)
         sys.stdout.write(f"table: {output}\n")
@@ -89,7 +89,7 @@ def _check(output: Path | None, jobs: int | None) -> None:
         raise TilestampError(f"-o {output}: there is no folder {output.absolute().parent}")
 
 
-def _agree(cells: int, *, yes: bool) -> None:
+def agree(cells: int, *, yes: bool) -> None:
     """Ask before a study of very many cells."""
     if yes or cells <= MOST_LISTED:
         return
@@ -101,15 +101,16 @@ def _agree(cells: int, *, yes: bool) -> None:
         raise TilestampError(f"nothing was run of {cells:,} cells")
 
 
-def _print(table: "pd.DataFrame", title: str) -> None:
-    """Print the first rows of the table."""
-    rows = [[_text(value) for value in row] for row in table.head(PRINTED).itertuples(index=False)]
+def print_rows(table: "pd.DataFrame", title: str) -> None:
+    """Print the first rows of a table."""
+    rows = [[cell_text(value) for value in row] for row in table.head(PRINTED).itertuples(index=False)]
     print_table(title, list(map(str, table.columns)), rows)
     if len(table) > PRINTED:
         sys.stdout.write(f"... and {len(table) - PRINTED:,} rows more: -o FILE.csv has all\n")
 
 
-def _text(value: object) -> str:
+def cell_text(value: object) -> str:
+    """A value as a table on the terminal has it."""
     if value is None or value != value:  # noqa: PLR0124 - not-a-number
         return ""
     return f"{value:.5g}" if isinstance(value, float) else str(value)

@@ -7,7 +7,7 @@ together (zip) are one, and so are all that are sampled. The cells are the produ
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeGuard
 
 import msgspec
 import numpy as np
@@ -69,7 +69,7 @@ def choices(name: str, axis: Axis, *, whole: bool) -> list[Choice]:
     """
     if not isinstance(axis, Mapping):
         values = list(axis) if isinstance(axis, Sequence | np.ndarray) and not isinstance(axis, str) else [axis]
-    elif "from" in axis or "to" in axis:
+    elif is_range(axis):
         span = _range(axis)
         if span.points is None:
             raise TilestampError('a range needs points, such as { from = 1, to = 4, points = 5, scale = "log" }')
@@ -81,6 +81,11 @@ def choices(name: str, axis: Axis, *, whole: bool) -> list[Choice]:
     return [Choice({name: shown(value)}, {name: value}) for value in values]
 
 
+def is_range(axis: Axis) -> TypeGuard[Mapping[str, Any]]:
+    """Whether an axis is a range."""
+    return isinstance(axis, Mapping) and ("from" in axis or "to" in axis)
+
+
 def sampled(sample: Sample, whole: Mapping[str, bool]) -> list[Choice]:
     """Choose the points of a sample, each a choice."""
     if not sample.axes:
@@ -89,7 +94,7 @@ def sampled(sample: Sample, whole: Mapping[str, bool]) -> list[Choice]:
     columns = []
     for column, (name, axis) in enumerate(sample.axes.items()):
         with place("sample", "axes", name):
-            columns.append(_at(name, axis, shares[:, column], whole.get(name, False)))
+            columns.append(at_shares(name, axis, shares[:, column], whole.get(name, False)))
     return [merged(row) for row in zip(*columns, strict=True)]
 
 
@@ -141,9 +146,9 @@ def _variant(name: str, label: str, parameters: object) -> Choice:
     return Choice({name: label}, dict(parameters))
 
 
-def _at(name: str, axis: Axis, shares: NDArray[np.float64], whole: bool) -> list[Choice]:
-    """Values of one axis of a sample at shares of the way."""
-    if isinstance(axis, Mapping) and ("from" in axis or "to" in axis):
+def at_shares(name: str, axis: Axis, shares: NDArray[np.float64], whole: bool) -> list[Choice]:
+    """Values of one axis of a space at shares of the way: a list in equal parts."""
+    if is_range(axis):
         span = _range(axis)
         if span.points is not None:
             raise TilestampError("a range of a sample takes no points: [sample] says how many there are")

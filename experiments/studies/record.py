@@ -2,7 +2,8 @@
 
 ``milliseconds``, ``low_milliseconds``, ``high_milliseconds`` and ``bound`` are the frame's; ``STAGE.COLUMN`` is a
 column of ``run.stages`` (``tile_raster.milliseconds``, ``*.bound`` of every stage), ``STAGE.EVENT`` a count,
-``facts.NAME`` what the pipeline says besides; the name of a column alone is its sum over the stages.
+``facts.NAME`` what the pipeline says besides; ``area`` is the machine's (``experiments.studies.area``); the name of a
+column alone is its sum over the stages.
 """
 
 import math
@@ -10,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Any
 
+from tilestamp.experiments.studies.area import area
 from tilestamp.simulator.prices import Prices
 from tilestamp.simulator.run import Run
 
@@ -53,7 +55,9 @@ class Recorded:
 
     def _named(self, name: str) -> Iterator[tuple[str, Any]]:
         stage, dot, column = name.rpartition(".")
-        if not dot:
+        if name == "area":
+            yield name, area(self._prices.machines[self._place])
+        elif not dot:
             yield name, self._of(None, name)
         elif stage == "*":
             yield from ((f"{one}.{column}", self._of(one, column)) for one in dict.fromkeys(self._prices.stages))

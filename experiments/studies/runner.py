@@ -56,7 +56,7 @@ class Summary:
         return said + [f"failed: {fault}" for fault in dict.fromkeys(self.faults)]
 
 
-def run(study: Design, jobs: int | None, cluster: str | None, say: Callable[[str], None]) -> Summary:
+def run_study(study: Design, jobs: int | None, cluster: str | None, say: Callable[[str], None]) -> Summary:
     """Run what is not stored; see ``Study.run``."""
     begin = time.perf_counter()
     resolver, summary = Resolver(), Summary(cells=len(study))

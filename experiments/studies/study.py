@@ -38,7 +38,7 @@ class Study(Design):
         TilestampError
             What is wrong with the study, the store or the workers; what was stored is safe.
         """
-        return runner.run(self, jobs, cluster, say)
+        return runner.run_study(self, jobs, cluster, say)
 
     def table(self) -> "pd.DataFrame":
         """All cells of this study that are stored, in its order: a column an axis, a column a number."""

@@ -1,0 +1,186 @@
+"""``tilestamp ask``: questions to a study file; what the answer needs and the store lacks is run."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from tilestamp.experiments.commands.outputs import check_png
+from tilestamp.experiments.commands.study import agree, print_rows
+from tilestamp.experiments.commands.terminal import Progress, progress, writing
+from tilestamp.experiments.questions import answers
+from tilestamp.experiments.studies.places import StudyError
+from tilestamp.experiments.studies.store import Store
+from tilestamp.experiments.studies.study import Study
+from tilestamp.experiments.studies.study_file import StudyFile
+
+StorePath = Annotated[Path | None, Parameter(name="--store")]
+Picture = Annotated[Path | None, Parameter(name=["--output", "-o"])]
+Jobs = Annotated[int | None, Parameter(name=["--jobs", "-j"])]
+ask = App(name="ask", help="Ask a study: what is best where, what lies on a front, what matters, what is better still.")
+
+
+@ask.command
+def best(
+    file: Path,
+    axis: str,
+    /,
+    *,
+    over: str,
+    number: str = "milliseconds",
+    output: Picture = None,
+    store: StorePath = None,
+    jobs: Jobs = None,
+) -> None:
+    """Which value of an axis is the best at each place of a plane, and where that changes.
+
+    Parameters
+    ----------
+    file
+        The study, TOML (docs/studies.md).
+    axis
+        The axis whose best value is wanted, such as `tile`.
+    over
+        The plane: two other axes, `zoom,machine`. Each place on all further axes is a panel.
+    number
+        What is to be small.
+    output
+        Write the map as .png.
+    store
+        SQLite file that keeps the cells; beside the study, with the same name, if not given.
+    jobs
+        Processes; as many as the forecast is worth if not given.
+    """
+    check_png(output)
+    with _study(file, store) as (asked, say):
+        agree(len(asked), yes=False)
+        _show(answers.best(asked, axis, _names(over), number, jobs, say), file, output)
+
+
+@ask.command
+def front(
+    file: Path, one: str, other: str, /, *, output: Picture = None, store: StorePath = None, jobs: Jobs = None
+) -> None:
+    """Which cells nothing beats in two numbers at once: the Pareto front, both to be small.
+
+    Parameters
+    ----------
+    file
+        The study, TOML (docs/studies.md).
+    one, other
+        Numbers of a cell, such as `milliseconds` and `area`, or axes.
+    output
+        Write the front as .png.
+    store
+        SQLite file that keeps the cells; beside the study, with the same name, if not given.
+    jobs
+        Processes; as many as the forecast is worth if not given.
+    """
+    check_png(output)
+    with _study(file, store) as (asked, say):
+        agree(len(asked), yes=False)
+        _show(answers.front(asked, one, other, jobs, say), file, output)
+
+
+@ask.command
+def screen(
+    file: Path, number: str = "milliseconds", /, *, walks: int = 8, output: Picture = None, store: StorePath = None
+) -> None:
+    """Which axes matter: Morris screening of the space between the ends of the study's axes.
+
+    Parameters
+    ----------
+    file
+        The study, TOML (docs/studies.md).
+    number
+        What is looked at.
+    walks
+        Through the space; each has a cell more than there are axes.
+    output
+        Write the effects as .png.
+    store
+        SQLite file that keeps the cells; beside the study, with the same name, if not given.
+    """
+    check_png(output)
+    with _study(file, store) as (asked, _):
+        _show(answers.screened(asked, number, walks), file, output)
+
+
+@ask.command
+def sobol(
+    file: Path, number: str = "milliseconds", /, *, points: int = 64, output: Picture = None, store: StorePath = None
+) -> None:
+    """What share of a number's variance each axis accounts for: Sobol indices.
+
+    Parameters
+    ----------
+    file
+        The study, TOML (docs/studies.md).
+    number
+        What is looked at.
+    points
+        A power of two; as many cells as points times (axes and two).
+    output
+        Write the indices as .png.
+    store
+        SQLite file that keeps the cells; beside the study, with the same name, if not given.
+    """
+    check_png(output)
+    with _study(file, store) as (asked, _):
+        _show(answers.shared(asked, number, points), file, output)
+
+
+@ask.command
+def search(
+    file: Path, wanted: str = "milliseconds", /, *, cells: int = 64, seed: int = 0, output: Picture = None,
+    store: StorePath = None,
+) -> None:  # fmt: skip
+    """Look for the best point between the ends of the study's axes, or for the front of several numbers (optuna).
+
+    Parameters
+    ----------
+    file
+        The study, TOML (docs/studies.md).
+    wanted
+        What is to be small: `milliseconds`, or several numbers, `milliseconds,area`.
+    cells
+        To run, those that are stored included.
+    seed
+        Of the search: the same one asks for the same points.
+    output
+        Write how it went as .png.
+    store
+        SQLite file that keeps the cells; beside the study, with the same name, if not given.
+    """
+    check_png(output)
+    with _study(file, store) as (asked, say):
+        _show(answers.searched(asked, _names(wanted), cells, seed, say), file, output)
+
+
+@contextmanager
+def _study(file: Path, store: Path | None) -> Iterator[tuple[Study, Progress]]:
+    """The study of a file with its store open, and whom to tell how far it is."""
+    read = StudyFile(file)
+    try:
+        with closing(Store(store or file.with_suffix(".sqlite"))) as kept, progress("running cells") as say:
+            yield read.study(kept), say
+    except StudyError as error:
+        raise read.placed(error) from None
+
+
+def _show(answer: answers.Answer, file: Path, output: Path | None) -> None:
+    """Print an answer, and draw it."""
+    print_rows(answer.table, file.stem)
+    sys.stdout.writelines(f"- {sentence}\n" for sentence in answer.sentences)
+    if output is not None:
+        with writing(output):
+            answer.draw(output)
+        sys.stdout.write(f"picture: {output}\n")
+
+
+def _names(text: str) -> list[str]:
+    """Names between commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
