@@ -202,7 +202,7 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
     fits = tables.pop("fits", {})
     completed: dict[str, dict[str, Any]] = {}
     for each, table in tables.items():
-        completed[each] = _completed(name, completed, table)  # noqa: PERF403 - it may be like one completed before
+        completed[each] = _completed(name, completed, table)
     kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in completed.items()}
     return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
 
