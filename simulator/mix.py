@@ -19,6 +19,9 @@ the table ``fits`` of the file). Without ``fitted`` all columns of a table of pr
 
 ``load_bytes`` and ``store_bytes`` are local memory: a thread's arrays, 128 bytes for a word of each lane of a warp. L1
 holds it; with ``uncached_local = true`` in the kernel's table (compute capability 1.x) it is a buffer as others are.
+
+A file may leave the kernels that it has no table for to the file of an older family (``older = "cc8"``).
+
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own. What it has in
 common with a table before it need not be said again: ``like = "tile_raster"``.
@@ -196,15 +199,22 @@ def load_mix(pipeline: str, compute_capability: str) -> Mix:
         No mix, an unknown column, or a number without provenance.
     """
     path = _path_for(pipeline, int(float(compute_capability)))
+    kernels, text = _read(path)
+    return Mix(f"{pipeline}/{path.stem}", kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
+
+
+def _read(path: Path) -> tuple[dict[str, KernelMix], str]:
+    """Kernels of a mix file, those that it leaves to an ``older`` one among them; and the text of both."""
     text = path.read_text("utf-8")
-    name = f"{pipeline}/{path.stem}"
     tables = tomllib.loads(text)
-    fits = tables.pop("fits", {})
+    fits, older = tables.pop("fits", {}), tables.pop("older", "")
+    kernels, before = _read(path.with_stem(older)) if older else ({}, "")
+    mix = f"{path.parent.name}/{path.stem}"
     completed: dict[str, dict[str, Any]] = {}
-    for each, table in tables.items():
-        completed[each] = _completed(name, completed, table)
-    kernels = {kernel: _kernel_mix(name, kernel, table, fits) for kernel, table in completed.items()}
-    return Mix(name, kernels, hashlib.sha256(text.encode()).hexdigest()[:16])
+    for name, table in tables.items():
+        completed[name] = _completed(mix, completed, table)
+    kernels |= {name: _kernel_mix(mix, name, table, fits) for name, table in completed.items()}
+    return kernels, before + text
 
 
 def _path_for(pipeline: str, major: int) -> Path:

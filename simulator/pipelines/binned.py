@@ -88,7 +88,17 @@ def binned(
     primitives = execute(primitive_compaction, slots, len(mesh.triangles), simt).outputs
     data = execute(triangle_setup, primitives, simt, triangles=len(mesh.triangles)).outputs
     bins = execute(primitive_binning, data.boxes, width, height, simt, triangles=len(mesh.triangles)).outputs
-    tiles = execute(coarse_rasterizer, data, bins, width, height, simt, hi_z=opaque, unrolled=optimized).outputs
+    tiles = execute(
+        coarse_rasterizer,
+        data,
+        bins,
+        width,
+        height,
+        simt,
+        hi_z=opaque,
+        unrolled=optimized,
+        exact_hi_z=options.original_faults,
+    ).outputs
     fragments = execute(
         fine_rasterizer,
         data,

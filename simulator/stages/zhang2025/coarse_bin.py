@@ -1,4 +1,9 @@
-"""One bin of the CoarseRasterizer (Zhang 2025, stage 6): box, edges, Hi-Z, queues of its tiles (device functions)."""
+"""One bin of the CoarseRasterizer (Zhang 2025, stage 6): box, edges, Hi-Z, queues of its tiles (device functions).
+
+The warps of a round walk the tiles side by side, and a warp's lanes test a tile's depth before any of them lowers it.
+So a primitive is rejected by those of earlier rounds, and of its own round by those of a warp that is ahead. Who is
+ahead is decided here by the steps that each has made: on a GPU by cycles, which differ a little from frame to frame.
+"""
 
 from enum import IntEnum
 from typing import Any
@@ -13,7 +18,12 @@ from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH
 BLOCK = 256  # threads, and primitives a round
 TILE = 8  # pixels
 TILES_A_ROW = BIN // TILE
-HI_Z_MARGIN = 4  # units of 24 bits
+TILES = TILES_A_ROW**2
+CHUNK = 512  # queue entries
+# how long a warp is at a tile, in cycles of one alone by the compiler's schedule: all fail the tests before depth; some
+# lane has its depth tested; passes; and for each lane that lowers the tile's, at one address
+_TILE, _TESTED, _KEPT, _UPDATED = 25, 80, 60, 16
+_ARRIVED = 2**62
 _ZERO = np.float32(0.0)
 
 
@@ -45,6 +55,11 @@ class CoarseRasterizerEvent(IntEnum):
     FILLS = 22  # of them, those with primitives of this bin
     CRITICAL_HI_Z_STEPS = 23  # of the warp with most of them, round by round: the others wait for it
     CRITICAL_APPEND_STEPS = 24  # the same of the appends
+    KEPT_STEPS = 25  # warp executions of what follows a depth test that some lane passes
+    KEPT_LANES = 26
+    CHUNK_STEPS = 27  # warp steps of the append in which a lane goes on to a new chunk of its queue
+    CHUNK_SECTORS = 28  # pairs of tiles that do so in one step: their numbers of chunks share a sector
+    BLOCKS = 29
 
 
 @kernel(error_model="numpy")
@@ -67,14 +82,13 @@ def _depth_range(plane: Any, left: Any, bottom: Any) -> tuple[int, int]:
 
 @kernel(error_model="numpy")
 def _tile_of_warp(
-    edges: Any, planes: Any, boxes: Any, listed: Any, left: Any, bottom: Any, hi_z: Any, tile: int, masks: Any, row: Any
-) -> None:
-    """All lanes of a warp at one tile; sets the lanes' bits in ``masks``."""
+    edges: Any, planes: Any, boxes: Any, listed: Any, left: Any, bottom: Any, cached: int, tile: int, margin: int,
+    masks: Any, row: Any,
+) -> tuple[int, int]:  # fmt: skip
+    """All lanes of a warp at one tile; sets their bits in ``masks``; returns how long they take and the new depth."""
     side = np.float32(TILE)
-    tested = 0
-    passed = 0
-    updates = 0
-    cached = hi_z[tile]
+    tested = passed = kept = updates = 0
+    lowered = NO_DEPTH
     for lane in range(len(listed)):
         p = listed[lane]
         if max(boxes[p, 0], left) >= min(boxes[p, 2], left + side):
@@ -91,60 +105,105 @@ def _tile_of_warp(
             continue
         passed += 1
         low, high = _depth_range(planes[p, DEPTH], left, bottom)
-        if cached + HI_Z_MARGIN < low:
-            row[CoarseRasterizerEvent.HI_Z_REJECTED] += 1
+        if cached + margin < low:
             continue
+        kept += 1
         if covers:
             updates += 1
-            hi_z[tile] = min(hi_z[tile], high)
+            lowered = min(lowered, high)
         masks[tile, lane] = True
     row[CoarseRasterizerEvent.EDGE_STEPS] += tested > 0
     row[CoarseRasterizerEvent.EDGE_LANES] += tested
     row[CoarseRasterizerEvent.HI_Z_STEPS] += passed > 0
     row[CoarseRasterizerEvent.HI_Z_LANES] += passed
+    row[CoarseRasterizerEvent.HI_Z_REJECTED] += passed - kept
+    row[CoarseRasterizerEvent.KEPT_STEPS] += kept > 0
+    row[CoarseRasterizerEvent.KEPT_LANES] += kept
     row[CoarseRasterizerEvent.HI_Z_UPDATES] += updates
     row[CoarseRasterizerEvent.SHARED_ATOMIC] += updates > 0
     row[CoarseRasterizerEvent.BANK_REPLAYS] += max(0, updates - 1)  # one address
+    return _TESTED * (passed > 0) + _KEPT * (kept > 0) + _UPDATED * updates, lowered
+
+
+@kernel(error_model="numpy")
+def _test_round(
+    edges: Any, planes: Any, boxes: Any, listed: Any, origin_x: int, origin_y: int, warp: int, margin: int, hi_z: Any,
+    masks: Any, row: Any,
+) -> None:  # fmt: skip
+    """Walk the tiles with all warps of a round, always the one that is behind; sets ``masks`` (256, primitives)."""
+    warps = -(-len(listed) // warp)
+    clock, following, steps = np.zeros(warps, np.int64), np.zeros(warps, np.int64), np.zeros(warps, np.int64)
+    lowered = np.full(warps, NO_DEPTH, np.int64)  # by a warp that still is at its last tile
+    spans = np.empty((warps, 4), np.int64)
+    for w in range(warps):
+        spans[w] = _tiles_of(boxes, listed[w * warp : (w + 1) * warp], origin_x, origin_y)
+    for _ in range(warps * TILES):
+        w = clock.argmin()
+        tile = following[w]
+        hi_z[tile - 1] = min(hi_z[tile - 1], lowered[w])
+        lowered[w] = NO_DEPTH
+        x, y = tile % TILES_A_ROW, tile // TILES_A_ROW
+        low_x, low_y, high_x, high_y = spans[w]
+        clock[w] += _TILE
+        if low_x <= x <= high_x and low_y <= y <= high_y:
+            before = row[CoarseRasterizerEvent.HI_Z_STEPS]
+            left, bottom = np.float32(origin_x + x * TILE), np.float32(origin_y + y * TILE)
+            lanes = slice(w * warp, (w + 1) * warp)
+            taken, lowered[w] = _tile_of_warp(
+                edges, planes, boxes, listed[lanes], left, bottom, hi_z[tile], tile, margin, masks[:, lanes], row
+            )
+            clock[w] += taken
+            steps[w] += row[CoarseRasterizerEvent.HI_Z_STEPS] - before
+        following[w] += 1
+        if following[w] == TILES:
+            clock[w] = _ARRIVED
+    hi_z[TILES - 1] = min(hi_z[TILES - 1], lowered.min())
+    row[CoarseRasterizerEvent.WARPS] += warps
+    row[CoarseRasterizerEvent.WARP_LANES] += len(listed)
+    row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += steps.max()
+
+
+@kernel(error_model="numpy")
+def _append(masks: Any, listed: Any, warp: int, counts: Any, entries: Any, cursors: Any, row: Any) -> None:
+    """Append a round's primitives to the tiles' queues, as a warp's lanes do for theirs."""
+    most = 0
+    for first in range(0, len(counts), warp):
+        before = row[CoarseRasterizerEvent.APPEND_STEPS]
+        for i in range(len(listed)):
+            some, pair, new = 0, -1, 0
+            for tile in range(first, first + warp):
+                if not masks[tile, i]:
+                    continue
+                some += 1
+                if counts[tile] % CHUNK == 0:
+                    new += pair != tile // 2
+                    pair = tile // 2
+                counts[tile] += 1
+                if entries is not None:
+                    entries[cursors[tile]] = listed[i]
+                    cursors[tile] += 1
+            row[CoarseRasterizerEvent.APPEND_STEPS] += some > 0
+            row[CoarseRasterizerEvent.ENTRIES] += some
+            row[CoarseRasterizerEvent.CHUNK_STEPS] += new > 0
+            row[CoarseRasterizerEvent.CHUNK_SECTORS] += new
+        most = max(most, row[CoarseRasterizerEvent.APPEND_STEPS] - before)
+    row[CoarseRasterizerEvent.CRITICAL_APPEND_STEPS] += most
 
 
 @kernel(error_model="numpy")
 def rasterize_bin(
-    edges: Any, planes: Any, boxes: Any, queue: Any, origin_x: int, origin_y: int, warp: int, use_hi_z: bool,
+    edges: Any, planes: Any, boxes: Any, queue: Any, origin_x: int, origin_y: int, warp: int, margin: int,
     counts: Any, entries: Any, cursors: Any, row: Any,
 ) -> None:  # fmt: skip
-    """One bin: fill ``counts`` (256,) where ``entries`` is None, else the queues."""
-    hi_z = np.full(TILES_A_ROW * TILES_A_ROW, NO_DEPTH, np.int64)
-    masks = np.zeros((TILES_A_ROW * TILES_A_ROW, warp), np.bool_)
-    slowest = 0
-    for first in range(0, len(queue), warp):
-        listed = queue[first : first + warp]
-        if first % BLOCK == 0:
-            row[CoarseRasterizerEvent.ROUNDS] += 1
-            slowest = 0
-        before = row[CoarseRasterizerEvent.HI_Z_STEPS]
-        row[CoarseRasterizerEvent.WARPS] += 1
-        row[CoarseRasterizerEvent.WARP_LANES] += len(listed)
-        low_x, low_y, high_x, high_y = _tiles_of(boxes, listed, origin_x, origin_y)
-        for y in range(low_y, high_y + 1):
-            for x in range(low_x, high_x + 1):
-                tile = y * TILES_A_ROW + x
-                left, bottom = np.float32(origin_x + x * TILE), np.float32(origin_y + y * TILE)
-                _tile_of_warp(edges, planes, boxes, listed, left, bottom, hi_z, tile, masks, row)
-                for lane in range(len(listed)):
-                    if masks[tile, lane]:
-                        masks[tile, lane] = False
-                        row[CoarseRasterizerEvent.ENTRIES] += 1
-                        if entries is not None:
-                            entries[cursors[tile]] = listed[lane]
-                            cursors[tile] += 1
-                        else:
-                            counts[tile] += 1
-                if not use_hi_z:
-                    hi_z[tile] = NO_DEPTH
-        row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += max(
-            0, row[CoarseRasterizerEvent.HI_Z_STEPS] - before - slowest
-        )
-        slowest = max(slowest, row[CoarseRasterizerEvent.HI_Z_STEPS] - before)
+    """One bin: fill ``counts`` (256,), and the queues where ``entries`` is not None."""
+    hi_z = np.full(TILES, NO_DEPTH, np.int64)
+    masks = np.empty((TILES, BLOCK), np.bool_)
+    for first in range(0, len(queue), BLOCK):
+        listed = queue[first : first + BLOCK]
+        masks[:] = False
+        row[CoarseRasterizerEvent.ROUNDS] += 1
+        _test_round(edges, planes, boxes, listed, origin_x, origin_y, warp, margin, hi_z, masks, row)
+        _append(masks, listed, warp, counts, entries, cursors, row)
 
 
 @kernel(error_model="numpy")

@@ -5,8 +5,8 @@ primitive: box, three edges at the tile's nearest corner, then Hi-Z, a depth a t
 lowers (atomicMin) where it covers the whole tile. 256 ballots transpose the masks; each thread then owns a tile and
 appends serially to its queue, in chunks of 512 entries from one global atomicAdd a round.
 
-A warp walks the tiles in lockstep, so its lanes read a tile's Hi-Z before any of them lowers it. The original rejects
-where the stored depth is not greater; here by a margin of 4 units of 24 bits, so that rounding rejects nothing visible.
+The original rejects where the stored depth is not greater (``exact_hi_z``); here by a margin of 4 units of 24 bits, so
+that rounding rejects nothing visible.
 """
 
 from typing import Any, NamedTuple
@@ -20,12 +20,13 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.zhang2025.coarse_bin import BLOCK, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
+from tilestamp.simulator.stages.zhang2025.coarse_bin import BLOCK, CHUNK, TILES, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
 from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
 from tilestamp.simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
 from tilestamp.simulator.work import Work
 
-CHUNK = 512  # queue entries
+HI_Z_MARGIN, EXACT, NO_HI_Z = 4, -1, 1 << 40  # units of 24 bits by which a depth may lie behind and is not rejected
+SETUP_WORDS = 16  # that are read of a primitive: box, edges, depth
 SHARED_BYTES = 4 * (256 + 256 + 8 * 257 + 32 + 7)  # primitives, Hi-Z, masks of each warp and tile, a scan, cursors
 
 
@@ -48,7 +49,7 @@ class TileQueues(NamedTuple):
 @kernel(error_model="numpy")
 def _coarse_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, boxes: Any, starts: Any, queue: Any, columns: int, warp: int,
-    use_hi_z: bool, counts: Any, entries: Any, cursors: Any, events: Any,
+    margin: int, counts: Any, entries: Any, cursors: Any, events: Any,
 ) -> None:  # fmt: skip
     """A part of the bins."""
     for i in range(part * len(events) // parts, (part + 1) * len(events) // parts):
@@ -56,12 +57,20 @@ def _coarse_rasterizer(
         b = x + y * BINS_A_ROW
         listed = queue[starts[b] : starts[b + 1]]
         rasterize_bin(
-            edges, planes, boxes, listed, x * BIN, y * BIN, warp, use_hi_z, counts[i], entries, cursors[i], events[i]
+            edges, planes, boxes, listed, x * BIN, y * BIN, warp, margin, counts[i], entries, cursors[i], events[i]
         )
 
 
 def coarse_rasterizer(
-    data: TriangleSetupData, bins: BinQueues, width: int, height: int, simt: Simt, *, hi_z: bool, unrolled: bool
+    data: TriangleSetupData,
+    bins: BinQueues,
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    hi_z: bool,
+    unrolled: bool,
+    exact_hi_z: bool = False,
 ) -> StageResult[TileQueues]:
     """Make the tile queues.
 
@@ -76,6 +85,8 @@ def coarse_rasterizer(
         Whether Hi-Z rejects (not with transparency).
     unrolled : bool
         The optimized kernel: the same work with the loops unrolled.
+    exact_hi_z : bool
+        Without a margin, as the original.
 
     Returns
     -------
@@ -83,18 +94,18 @@ def coarse_rasterizer(
     works : one, a row a bin
     """
     columns, rows = -(-width // BIN), -(-height // BIN)
-    tiles = TILES_A_ROW * TILES_A_ROW
-    shape = (*data[:3], bins.starts, bins.entries, columns, simt.warp, hi_z)
-    counts = np.zeros((columns * rows, tiles), np.int64)
+    margin = (EXACT if exact_hi_z else HI_Z_MARGIN) if hi_z else NO_HI_Z
+    shape = (*data[:3], bins.starts, bins.entries, columns, simt.warp, margin)
+    counts = np.zeros((columns * rows, TILES), np.int64)
     events = np.zeros((columns * rows, len(CoarseRasterizerEvent)), np.int64)
-    cursors = np.zeros((columns * rows, tiles), np.int64)
+    cursors = np.zeros((columns * rows, TILES), np.int64)
     for_parts(_coarse_rasterizer, len(events), *shape, counts, None, cursors, events)
     by_row = counts.reshape(rows, columns, TILES_A_ROW, TILES_A_ROW).swapaxes(1, 2)
     starts = np.concatenate([[0], np.cumsum(by_row.ravel())]).astype(np.int64)
-    firsts = starts[:-1].reshape(by_row.shape).swapaxes(1, 2).reshape(columns * rows, tiles)
+    firsts = starts[:-1].reshape(by_row.shape).swapaxes(1, 2).reshape(columns * rows, TILES)
     entries = np.empty(int(starts[-1]), np.int32)
     cursors = firsts.copy()  # of one bin, a view would move the starts
-    for_parts(_coarse_rasterizer, len(events), *shape, counts, entries, cursors, np.zeros_like(events))
+    for_parts(_coarse_rasterizer, len(events), *shape, np.zeros_like(counts), entries, cursors, np.zeros_like(events))
     events[:, CoarseRasterizerEvent.FILLS] = _fills(bins, columns, rows)
     _add_costs(events, counts, -(-len(data.ids) // BLOCK), simt)
     total = events.sum(axis=0)
@@ -128,17 +139,30 @@ def _fills(bins: BinQueues, columns: int, rows: int) -> NDArray[np.int64]:
 
 
 def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], sub_queues: int, simt: Simt) -> None:
-    """Add what follows from the counts: appends, one atomicAdd a round, memory."""
+    """Add what follows from the counts: one atomicAdd a round, memory.
+
+    Two tiles share a sector of numbers of chunks, which are stored, loaded, and corrected in the end; depths of tiles
+    are loaded and stored whole.
+    """
     event = CoarseRasterizerEvent
     segment = smallest_transaction_bytes(int(simt.coalescing))
-    appended = counts.reshape(len(counts), -1, simt.warp)
-    events[:, event.APPEND_STEPS] = appended.max(axis=2).sum(axis=1)  # at least: lanes of a warp seldom share a step
-    events[:, event.CRITICAL_APPEND_STEPS] = appended.max(axis=(1, 2))
+    events[:, event.BLOCKS] = 1
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[:, name] = events[:, event.ROUNDS]
     events[:, event.SUB_QUEUES] = sub_queues
-    loads = events[:, event.WARP_LANES] * (SETUP_BYTES // 4 + 1)
-    events[:, event.LOAD_TRANSACTIONS] = loads
-    events[:, event.LOAD_BYTES] = loads * segment
-    events[:, event.STORE_TRANSACTIONS] = events[:, event.ENTRIES]
-    events[:, event.STORE_BYTES] = events[:, event.ENTRIES] * segment
+    depths = 4 * counts.shape[1] // segment
+    pairs = (counts.reshape(len(counts), -1, 2) > 0).any(axis=2).sum(axis=1)
+    chunks = (-(-counts // CHUNK)).reshape(len(counts), -1, 2).max(axis=2).sum(axis=1)
+    queue = -(-4 * events[:, event.WARP_LANES] // segment)
+    events[:, event.LOAD_TRANSACTIONS] = (
+        events[:, event.WARP_LANES] * SETUP_WORDS
+        + queue
+        + 2 * events[:, event.CHUNK_SECTORS]
+        + 2 * sub_queues
+        + pairs
+        + depths
+        + BLOCK // simt.warp
+    )
+    events[:, event.LOAD_BYTES] = events[:, event.LOAD_TRANSACTIONS] * segment
+    events[:, event.STORE_TRANSACTIONS] = events[:, event.ENTRIES] + 2 * chunks + pairs + depths
+    events[:, event.STORE_BYTES] = events[:, event.STORE_TRANSACTIONS] * segment

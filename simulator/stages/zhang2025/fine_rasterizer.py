@@ -30,6 +30,9 @@ from tilestamp.simulator.work import Work
 
 TILES_A_BLOCK = 4  # after optimization
 FRAGMENT_BYTES = 48
+FRAGMENT_STORES = 4  # of 16, 16, 8 and 4 bytes, a sector each
+EDGE_WORDS, DEPTH_WORDS, QUAD_WORDS = 9, 3, 22  # that are loaded of a primitive: for coverage, at each pixel, for quads
+FRAGMENT_OUT = 84  # bytes of a fragment that leave L1 for its four stores of 44 bytes in all: measured on an H200
 
 
 class TileFragments(NamedTuple):
@@ -110,12 +113,12 @@ def fine_rasterizer(
     total = table.sum(axis=0)
     pixels = width * height
     drawn = len(np.unique(tiles.entries))
-    written = 4 * FRAGMENT_BYTES * int(total[FineRasterizerEvent.QUADS])
+    quads = 4 * int(total[FineRasterizerEvent.QUADS])
     streams = (
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),
         Stream("setup", "load", 160 * int(total[FineRasterizerEvent.ROUND_LANES]), drawn * SETUP_BYTES),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments", "store", written, written),
+        Stream("fragments", "store", FRAGMENT_OUT * quads, FRAGMENT_BYTES * quads),
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
@@ -157,12 +160,13 @@ def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[..., name] = rounds
     depths = 8 * events[..., event.WARPS]  # eight rows of 32 bytes, read and written
-    setup = events[..., event.ROUND_LANES] * (SETUP_BYTES // 4) + quads * (
-        -(-SETUP_BYTES // segment) if optimized else 0
-    )
-    a_quad = 4 * FRAGMENT_BYTES // 16 // (4 * FRAGMENT_BYTES // 16 // 3 if optimized else 1)  # stores of 16 bytes
-    sectors = quads * (4 * FRAGMENT_BYTES // 32 if optimized else a_quad)
-    events[..., event.LOAD_TRANSACTIONS] = depths + setup + rounds * 4
-    events[..., event.LOAD_BYTES] = (depths + setup + rounds * 4) * segment
+    lanes = events[..., event.ROUND_LANES]
+    setup = SETUP_BYTES // 4 * lanes
+    if optimized:
+        setup = (EDGE_WORDS + QUAD_WORDS) * lanes + DEPTH_WORDS * events[..., event.SAMPLE_HITS]
+    queues = 2 * events[..., event.WARPS] + events[..., event.GROUP_STEPS]  # eight numbers of primitives a sector
+    sectors = quads * (4 * FRAGMENT_STORES if optimized else 4 * FRAGMENT_BYTES // 16)
+    events[..., event.LOAD_TRANSACTIONS] = depths + setup + queues
+    events[..., event.LOAD_BYTES] = events[..., event.LOAD_TRANSACTIONS] * segment
     events[..., event.STORE_TRANSACTIONS] = depths + sectors
     events[..., event.STORE_BYTES] = (depths + sectors) * 32

@@ -13,6 +13,7 @@ from tilestamp.simulator.stages.zhang2025.depth import depth_24_bit
 from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
 
 QUADS = 16  # of a tile
+GROUP = 8  # primitives whose quads four lanes each write side by side
 _HALF = np.float32(0.5)
 _ZERO = np.float32(0.0)
 
@@ -42,6 +43,9 @@ class FineRasterizerEvent(IntEnum):
     CRITICAL_ROUNDS = 18  # of the block's tile with the most early z steps: the block ends with it
     CRITICAL_Z_STEPS = 19
     CRITICAL_QUAD_STEPS = 20
+    QUAD_LANES = 21  # four of each quad
+    GROUP_STEPS = 22  # groups of eight primitives of a round, with one at least
+    GROUP_LANES = 23  # four of each primitive
 
 
 @kernel(error_model="numpy")
@@ -114,6 +118,8 @@ def rasterize_tile(
             written[i - first] = quad_mask(masks[i])
         row[FineRasterizerEvent.ROUNDS] += 1
         row[FineRasterizerEvent.ROUND_LANES] += end - first
+        row[FineRasterizerEvent.GROUP_STEPS] += -(-(end - first) // GROUP)
+        row[FineRasterizerEvent.GROUP_LANES] += 4 * (end - first)
         row[FineRasterizerEvent.SAMPLE_TESTS] += TILE * TILE * (end - first)
         for i in range(TILE * TILE):
             row[FineRasterizerEvent.SAMPLE_HITS] += hits[i]
@@ -122,7 +128,9 @@ def rasterize_tile(
             row[FineRasterizerEvent.BANK_REPLAYS] += max(0, hits[i] - 1)
         row[FineRasterizerEvent.QUAD_STEPS] += _quad_steps(written, optimized)
         for lane in range(warp):
-            row[FineRasterizerEvent.QUADS] += _bits(written[lane])
+            quads = _bits(written[lane])
+            row[FineRasterizerEvent.QUADS] += quads
+            row[FineRasterizerEvent.QUAD_LANES] += 4 * quads if optimized else quads
 
 
 @kernel(error_model="numpy")
@@ -137,7 +145,7 @@ def _bits(quads: int) -> int:
 @kernel(error_model="numpy")
 def _quad_steps(written: Any, optimized: bool) -> int:
     """Warp steps that write: over 16 quads for each group of 8 lanes' primitives, or for all lanes at once."""
-    group = 8 if optimized else len(written)
+    group = GROUP if optimized else len(written)
     steps = 0
     for first in range(0, len(written), group):
         some = 0

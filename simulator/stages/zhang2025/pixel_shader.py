@@ -77,14 +77,14 @@ def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any
 @kernel(error_model="numpy")
 def _pixel_shader(
     part: int, parts: int, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any,
-    method: int, opacity: Any, rule: int, colors: Any, events: Any,
+    method: int, opacity: Any, rule: int, merge: int, width: int, colors: Any, events: Any,
 ) -> None:  # fmt: skip
     """Shade a part of the blocks that have fragments."""
     blocks = (len(quads) + BLOCK // 4 - 1) // (BLOCK // 4)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         shade_block(
             quads, places, queue, planes, ids, texture_ids, chains, method,
-            opacity, rule, block * (BLOCK // 4), colors, events[block],
+            opacity, rule, merge, width, block * (BLOCK // 4), colors, events[block],
         )  # fmt: skip
 
 
@@ -132,9 +132,10 @@ def pixel_shader(
     events = np.zeros((blocks, len(PixelShaderEvent)), np.int64)
     for_parts(
         _pixel_shader, parts_of(4 * count, BLOCK), stream.entries, stream.places, tiles.entries, data.planes, data.ids,
-        texture_ids, chains, FILTERS[texture_filter], np.float32(opacity), int(simt.coalescing), stream.colors, events,
+        texture_ids, chains, FILTERS[texture_filter], np.float32(opacity), int(simt.coalescing),
+        int(simt.atomic_merge), fragments.depth.shape[1], stream.colors, events,
     )  # fmt: skip
-    _add_costs(events, simt, optimized)
+    _add_costs(events, optimized)
     total = events.sum(axis=0)
     texels = min(
         int(total[PixelShaderEvent.TEXTURE_BYTES]), len(chains.texels) * TEXEL_BYTES
@@ -142,8 +143,12 @@ def pixel_shader(
     streams = (
         Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
         Stream("texture", "load", texels, texels),
-        Stream("fragments_out", "store", 4 * count * FRAGMENT_OUT_BYTES, 4 * count * FRAGMENT_OUT_BYTES),
-        Stream("pixel_base", "atomic", 16 * count, min(16 * count, 4 * pixels)),
+        Stream(
+            "fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES
+        ),
+        Stream(
+            "pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), min(16 * count, 4 * pixels)
+        ),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     work = Work(
@@ -158,18 +163,19 @@ def pixel_shader(
     return StageResult(stream, (work,))
 
 
-def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
-    """Add what follows from the counts: fragments in and out, the links."""
+def _add_costs(events: NDArray[np.int64], optimized: bool) -> None:
+    """Add what follows from the counts: the stream's length, fragments in and out.
+
+    Records lie 48 and 32 bytes apart, so that each load or store touches a sector a lane: after optimization two
+    stores of 16 bytes and as many loads, or three where the normal is read and no texture; before it the seven words
+    read of a fragment, and the eight written.
+    """
     event = PixelShaderEvent
-    warps, lanes = events[:, event.WARPS], events[:, event.WARP_LANES]
-    events[:, event.EMPTY_WARPS] = BLOCK // simt.warp - warps
-    events[:, event.ATOMIC] = warps
-    events[:, event.ATOMIC_LANES] = lanes
-    events[:, event.ATOMIC_REQUESTS] = lanes // 2 if simt.atomic_merge else lanes  # the two pixels of a quad's row
-    events[:, event.ATOMIC_DEPTH] = warps
-    # records lie 48 and 32 bytes apart, so that each load or store touches a sector a lane: two of 16 bytes, or
-    # before, the seven words read of a fragment and the eight written
-    reads = warps * 32 * (2 if optimized else 7)
+    warps = events[:, event.WARPS]
+    events[:, event.WARPS_LAUNCHED] = BLOCK // 32
+    events[:, event.EMPTY_WARPS] = BLOCK // 32 - warps
+    words = 3 * warps - events[:, event.TEXTURED_WARPS] if optimized else 7 * warps
+    reads = 32 * words + BLOCK // 32
     writes = warps * 32 * (2 if optimized else FRAGMENT_OUT_BYTES // 4)
     events[:, event.LOAD_TRANSACTIONS] = reads + events[:, event.TEXTURE_TRANSACTIONS]
     events[:, event.LOAD_BYTES] = 32 * reads + events[:, event.TEXTURE_BYTES]

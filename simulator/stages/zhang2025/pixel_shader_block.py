@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.atomics import count_atomics
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.counters import shown, size
 from tilestamp.models.kernel import kernel
@@ -48,6 +49,9 @@ class PixelShaderEvent(IntEnum):
     LOAD_BYTES = 12
     STORE_TRANSACTIONS = 13
     STORE_BYTES = 14
+    TEXTURED_WARPS = 15
+    WARPS_LAUNCHED = 16  # each reads how long the stream is
+    ATOMIC_CONFLICTS = 17
 
 
 @kernel(error_model="numpy")
@@ -117,18 +121,21 @@ def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: 
 @kernel(error_model="numpy")
 def shade_block(
     quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any, method: int,
-    opacity: Any, rule: int, first: int, colors: Any, row: Any,
+    opacity: Any, rule: int, merge: int, width: int, first: int, colors: Any, row: Any,
 ) -> None:  # fmt: skip
     """One block: eight warps of eight quads."""
+    links = np.empty(4 * QUADS_A_WARP, np.int64)
     uv = np.zeros((4, 2), np.float32)
     addresses = np.empty((8, 4 * QUADS_A_WARP), np.int64)
     for warp in range(first, min(first + BLOCK // 4, len(quads)), QUADS_A_WARP):
-        addresses[:] = -1
+        addresses[:] = links[:] = -1
         textured = 0
         end = min(warp + QUADS_A_WARP, len(quads))
         for q in range(warp, end):
             p = queue[quads[q]]
             texture = texture_ids[ids[p]]
+            for k in range(4):
+                links[4 * (q - warp) + k] = 4 * (places[q, 0] + k % 2 + width * (places[q, 1] + k // 2))
             lod = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
             if row is not None and texture >= 0:
                 _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
@@ -136,6 +143,13 @@ def shade_block(
         if row is not None:
             row[PixelShaderEvent.WARPS] += 1
             row[PixelShaderEvent.WARP_LANES] += 4 * (end - warp)
+            row[PixelShaderEvent.TEXTURED_WARPS] += textured > 0
+            lanes, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP, merge)
+            row[PixelShaderEvent.ATOMIC] += 1
+            row[PixelShaderEvent.ATOMIC_LANES] += lanes
+            row[PixelShaderEvent.ATOMIC_REQUESTS] += requests
+            row[PixelShaderEvent.ATOMIC_CONFLICTS] += conflicts
+            row[PixelShaderEvent.ATOMIC_DEPTH] += depth
             loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
             row[PixelShaderEvent.TEXEL_LOADS] += loads
             row[PixelShaderEvent.TEXEL_LANES] += loads * textured

@@ -47,6 +47,7 @@ class PrimitiveAssemblyEvent(IntEnum):
     LOAD_BYTES = 11
     STORE_TRANSACTIONS = 12
     STORE_BYTES = 13
+    CLIP_WARPS = 14  # warps with a clipped triangle
 
 
 class Primitives(NamedTuple):
@@ -139,6 +140,7 @@ def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int
         for lane in range(warp):
             addresses[lane] = 0 if first + lane < len(triangles) and clipped[first + lane] else -1
         lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)
+        row[PrimitiveAssemblyEvent.CLIP_WARPS] += lanes > 0
         row[PrimitiveAssemblyEvent.ATOMIC] += lanes > 0
         row[PrimitiveAssemblyEvent.ATOMIC_LANES] += lanes
         row[PrimitiveAssemblyEvent.ATOMIC_REQUESTS] += merged

@@ -30,6 +30,7 @@ BIN = 128  # pixels
 BINS_A_ROW = 16
 MAX_BINS = 256
 CHUNK = 64  # queue entries
+A_SECTOR = 8  # words of 32 bytes
 SHARED_BYTES = 4 * (2 * 8 * 257 + 32 + 1)  # counts and masks of each warp and bin, a scan
 
 
@@ -49,6 +50,10 @@ class PrimitiveBinningEvent(IntEnum):
     LOAD_BYTES = 10
     STORE_TRANSACTIONS = 11
     STORE_BYTES = 12
+    LIVE_WARPS = 13  # warps with a primitive
+    BIN_LANES = 14
+    BASE_SECTORS = 15  # of the queues' bases, that the lanes of a step read
+    ENTRY_SECTORS = 16  # that they write
 
 
 class BinQueues(NamedTuple):
@@ -77,18 +82,46 @@ def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
 
 @kernel(error_model="numpy")
 def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: Any) -> None:
-    """Entries by sub-queue and bin, ``counts`` (blocks, 256)."""
-    steps = 0
-    for p in range(len(boxes)):
-        left, right, bottom, top = _bins(boxes[p], columns, rows)
-        for y in range(bottom, top + 1):
-            for x in range(left, right + 1):
-                counts[p // BLOCK, x + y * BINS_A_ROW] += 1
-        steps = max(steps, (right - left + 1) * (top - bottom + 1))
-        if p % warp == warp - 1 or p == len(boxes) - 1:
-            if events is not None:
-                events[p // BLOCK, PrimitiveBinningEvent.BIN_STEPS] += steps
-            steps = 0
+    """Entries by sub-queue and bin, ``counts`` (blocks, 256), and the steps of each warp over the bins of its boxes."""
+    bins = np.empty(warp, np.int64)  # of the lanes in one step
+    ranks = np.empty(warp, np.int64)
+    for first in range(0, len(boxes), warp):
+        row, queues = events[first // BLOCK], counts[first // BLOCK]
+        lanes = min(warp, len(boxes) - first)
+        row[PrimitiveBinningEvent.LIVE_WARPS] += 1
+        before = queues.copy()
+        steps = 1
+        step = 0
+        while step < steps:
+            for lane in range(lanes):
+                left, right, bottom, top = _bins(boxes[first + lane], columns, rows)
+                wide = right - left + 1
+                many = wide * (top - bottom + 1)
+                steps = max(steps, many)
+                bins[lane] = left + step % wide + (bottom + step // wide) * BINS_A_ROW if step < many else -1
+                if bins[lane] >= 0:
+                    queues[bins[lane]] += 1
+                ranks[lane] = before[bins[lane]] + _earlier(boxes, first, lane, bins[lane], columns, rows)
+            row[PrimitiveBinningEvent.BIN_STEPS] += 1
+            for lane in range(lanes):
+                new_base = new_entry = bins[lane] >= 0
+                for other in range(lane):
+                    new_base &= bins[other] < 0 or bins[other] // A_SECTOR != bins[lane] // A_SECTOR
+                    new_entry &= bins[other] != bins[lane] or ranks[other] // A_SECTOR != ranks[lane] // A_SECTOR
+                row[PrimitiveBinningEvent.BIN_LANES] += bins[lane] >= 0
+                row[PrimitiveBinningEvent.BASE_SECTORS] += new_base
+                row[PrimitiveBinningEvent.ENTRY_SECTORS] += new_entry
+            step += 1
+
+
+@kernel(error_model="numpy")
+def _earlier(boxes: Any, first: int, lane: int, b: int, columns: int, rows: int) -> int:
+    """Count the lanes before one whose boxes meet a bin: they write in front of it."""
+    count = 0
+    for other in range(lane):
+        left, right, bottom, top = _bins(boxes[first + other], columns, rows)
+        count += left <= b % BINS_A_ROW <= right and bottom <= b // BINS_A_ROW <= top
+    return count
 
 
 @kernel(error_model="numpy")
@@ -140,7 +173,7 @@ def primitive_binning(
     _add_costs(events, counts, len(boxes), simt)
     total = events.sum(axis=0)
     streams = (
-        Stream("compacted", "load", int(total[PrimitiveBinningEvent.LOAD_BYTES]), len(boxes) * PRIMITIVE_BYTES),
+        Stream("compacted", "load", 3 * 32 * len(boxes), len(boxes) * PRIMITIVE_BYTES),
         Stream(
             "bin_queue",
             "store",
@@ -174,7 +207,7 @@ def _add_costs(events: NDArray[np.int64], counts: NDArray[np.int64], primitives:
     working[:, event.CHUNKS] = (-(-counts // CHUNK)).sum(axis=1)
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
         events[:, name] = 1
-    events[:, event.LOAD_TRANSACTIONS] = 6 * lanes + events[:, event.ENTRIES]  # corners 112 bytes apart, queue bases
-    events[:, event.LOAD_BYTES] = events[:, event.LOAD_TRANSACTIONS] * segment
-    events[:, event.STORE_TRANSACTIONS] = events[:, event.ENTRIES] + 2 * BLOCK * 4 // segment
+    events[:, event.LOAD_TRANSACTIONS] = 6 * lanes + events[:, event.BASE_SECTORS] + events[:, event.WARPS]
+    events[:, event.LOAD_BYTES] = events[:, event.LOAD_TRANSACTIONS] * segment  # corners lie 112 bytes apart
+    events[:, event.STORE_TRANSACTIONS] = events[:, event.ENTRY_SECTORS] + 2 * BLOCK * 4 // segment
     events[:, event.STORE_BYTES] = events[:, event.STORE_TRANSACTIONS] * segment

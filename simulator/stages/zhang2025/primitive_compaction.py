@@ -34,6 +34,12 @@ class PrimitiveCompactionEvent(IntEnum):
     LOAD_BYTES = 4
     STORE_TRANSACTIONS = 5
     STORE_BYTES = 6
+    KEPT_WARPS = 7  # warps that copy a primitive
+    BLOCKS = 8
+    ATOMIC = 9  # of the grid's barrier, by one thread of each block
+    ATOMIC_LANES = 10
+    ATOMIC_REQUESTS = 11
+    ATOMIC_DEPTH = 12
 
 
 def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> StageResult[Primitives]:
@@ -56,12 +62,16 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> Stage
     events = np.zeros((blocks, len(PrimitiveCompactionEvent)), np.int64)
     warps = BLOCK // simt.warp
     copies = np.bincount(kept // BLOCK, minlength=blocks)
+    copying = np.bincount(np.unique(kept // simt.warp) // warps, minlength=blocks)
     ids = record_transactions(Access("primitives", PRIMITIVE_BYTES, 1), simt)
     segment = smallest_transaction_bytes(int(simt.coalescing))
     words = copies * (PRIMITIVE_BYTES // 4)
     events[:, PrimitiveCompactionEvent.WARPS] = warps
     events[:, PrimitiveCompactionEvent.KEPT] = copies
+    events[:, PrimitiveCompactionEvent.KEPT_WARPS] = copying
+    events[:, PrimitiveCompactionEvent.BLOCKS] = 1
     events[:, PrimitiveCompactionEvent.GRID_SYNC] = 2
+    events[:, PrimitiveCompactionEvent.ATOMIC :] = 2
     events[:, PrimitiveCompactionEvent.LOAD_TRANSACTIONS] = warps * ids[0] + words
     events[:, PrimitiveCompactionEvent.LOAD_BYTES] = warps * ids[1] + words * segment
     events[:, PrimitiveCompactionEvent.STORE_TRANSACTIONS] = words

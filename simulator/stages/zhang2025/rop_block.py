@@ -29,6 +29,9 @@ class RopEvent(IntEnum):
     STORE_TRANSACTIONS = 10
     STORE_BYTES = 11
     HOLES = 12  # pixels whose fragments all fail the depth test
+    LIST_WARPS = 13  # warps with a list
+    LIST_WARP_LANES = 14
+    SORT_LANES = 15
 
 
 @kernel(error_model="numpy")
@@ -90,7 +93,7 @@ def resolve_block(
     keys = np.empty((limit, 3), np.int64)
     lane = np.zeros(1, np.int64)
     for first in range(0, BLOCK_SIDE * BLOCK_SIDE, warp):
-        walked = sorted_steps = blended = live = 0
+        walked = sorted_steps = blended = live = lists = 0
         for thread in range(first, first + warp):
             x, y = left + thread % BLOCK_SIDE, bottom + thread // BLOCK_SIDE
             if x >= width or y >= height:
@@ -106,14 +109,18 @@ def resolve_block(
             winners[y, x] = _resolve(kept, keys, count, colors, ids, order, target[y, x], depth[y, x : x + 1])
             walked = max(walked, lane[0])
             blended = max(blended, count)
+            lists += 1
             sorted_steps = max(sorted_steps, count * (count - 1) // 2)
             if row is not None:
                 row[RopEvent.LIST_LANES] += lane[0]
                 row[RopEvent.BLEND_LANES] += count
+                row[RopEvent.SORT_LANES] += count * (count - 1) // 2
                 row[RopEvent.HOLES] += count > 0 and winners[y, x] < 0
         if row is not None and live:
             row[RopEvent.WARPS] += 1
             row[RopEvent.WARP_LANES] += live
+            row[RopEvent.LIST_WARPS] += lists > 0
+            row[RopEvent.LIST_WARP_LANES] += lists
             row[RopEvent.LIST_STEPS] += walked
             row[RopEvent.SORT_STEPS] += sorted_steps
             row[RopEvent.BLEND_STEPS] += blended
