@@ -9,8 +9,8 @@ l1          the load/store path of its SM: bytes of its transactions, and the re
             an SM sends its share of what all SMs together were measured to send
 
 and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, of a lone warp, and what that
-warp waits for others of its block on the same scheduler (half of what both want); or its own instructions when its
-warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
+warp waits for others of its block on the same scheduler (half of what both want), with its own ``l1`` on top where the
+block's warps go in step; or its own instructions when its warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
 
 All but a few maxima are sums of machine events times cycles: ``rates`` makes the matrix, and ``demands`` sees of a
 machine nothing else, so that two machines with the same matrix have the same demands.
@@ -59,6 +59,7 @@ class Other(IntEnum):
     START = 0  # cycles that a block waits for its own start
     SPREAD = 1  # schedulers / those that a unit's warps can use
     BESIDE = 2  # share of its issue that the warp of a block's chain waits for others on its scheduler
+    IN_STEP = 3  # 1 where a unit's own way through the load and store path comes on top of its chain, else 0
 
 
 class Demand(NamedTuple):
@@ -191,6 +192,7 @@ def _other_rates(others: Any, launch: Shape, machine: Any) -> None:
     warps = -(-launch.block // machine[M.SM_WARP_SIZE]) if launch.block_is_unit else 1.0
     others[Other.START] = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
     others[Other.SPREAD] = schedulers / min(schedulers, warps)
+    others[Other.IN_STEP] = launch.in_step
     if warps > schedulers:
         others[Other.BESIDE] = IN_THE_WAY * min(1.0, warps / schedulers - 1.0) * schedulers / warps
 
@@ -227,7 +229,8 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
             shared, l1, chain = row[Sum.SHARED], row[Sum.L1], row[Sum.CHAIN] + others[Other.START]
             found.issue[unit], found.shared[unit], found.l1[unit], found.chain[unit] = issue, shared, l1, chain
             found.scheduler[unit] = issue * others[Other.SPREAD]
-            found.alone[unit] = max(chain + issue * others[Other.BESIDE], found.scheduler[unit])
+            waited = issue * others[Other.BESIDE] + l1 * others[Other.IN_STEP]
+            found.alone[unit] = max(chain + waited, found.scheduler[unit])
             issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
             way = min(way, chain)
     return Whole(issues, shareds, l1s, chains, way)

@@ -62,6 +62,8 @@ class Shape(NamedTuple):
         Whether units are drawn from a queue by persistent blocks or warps.
     block_is_unit : bool
         Whether all warps of a block work on a unit together; else each warp draws its own.
+    in_step : bool
+        As in ``Launch``.
     """
 
     units: int
@@ -69,6 +71,7 @@ class Shape(NamedTuple):
     block: int
     drawn: bool
     block_is_unit: bool
+    in_step: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +92,9 @@ class Launch:
         Machine events of each unit of work, in the order in which units start.
     dispatch : {"blocks", "block_queue", "warp_queue"}
         What a unit is: a block of the grid, or an item that a persistent block or warp draws from a queue.
+    in_step : bool
+        Whether all warps of a unit load, compute and store at the same time, so that its own way through the SM's load
+        and store path comes on top of its chain.
     streams : tuple of Stream
         The buffers touched.
     atomic_requests : ndarray, (chunks,), int64, or None
@@ -103,6 +109,7 @@ class Launch:
     shared_bytes: int
     events: NDArray[np.float64]
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
+    in_step: bool = False
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
 
@@ -110,7 +117,7 @@ class Launch:
     def shape(self) -> Shape:
         """What a kernel sees of it."""
         drawn, alone = self.dispatch != "blocks", self.dispatch != "warp_queue"
-        return Shape(len(self.events), self.grid, self.block, drawn, alone)
+        return Shape(len(self.events), self.grid, self.block, drawn, alone, self.in_step)
 
     @cached_property
     def columns(self) -> NDArray[np.float64]:

@@ -62,7 +62,8 @@ def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np
     whole = demands(launch.columns, rates(launch.shape, machine, moved_of(facts), launch.totals), found)
     load_units(found, *units)
     terms = bound_terms(launch.shape, whole, launch.totals, machine, facts)
-    loaded = loads(launch.shape, units, launch.columns[E.ATOMIC_REQUESTS], terms, whole.way, machine, facts)
+    sizes = launch.columns[E.LOAD_BYTES] + launch.columns[E.STORE_BYTES]
+    loaded = loads(launch.shape, units, launch.columns[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, facts)
     return Opened(found, terms, loaded)
 
 
@@ -73,6 +74,7 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
     table = np.empty((6, count))
     units = Demand(table[0], table[1], table[2], table[3], table[4], table[5])
     sm, own, alone = np.empty(count), np.empty(count), np.empty(count)
+    sizes = events[E.LOAD_BYTES] + events[E.STORE_BYTES]
     seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
     settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
@@ -85,8 +87,8 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
         terms = bound_terms(launch, whole, totals, machine, fact)
         row[:TAIL] = terms
         if scheduled:
-            loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], terms, whole.way, machine, fact)
-            queue = terms[Term.QUEUE] if launch.drawn else 0.0
+            loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, fact)
+            queue = terms[Term.QUEUE] if launch.drawn else loaded.memory
             now = (float(loaded.places), float(loaded.sms), loaded.interval, loaded.start, queue)
             if now != settled:
                 played, settled = play(loaded), now

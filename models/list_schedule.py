@@ -13,20 +13,20 @@ from tilestamp.models.kernel import kernel
 
 @kernel
 def list_schedule(
-    sm: Any, alone: Any, draws: Any, places: int, sms: int, interval: float, start: float
+    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, interval: float, start: float
 ) -> tuple[float, float]:
     """End of all units; the start of the one that ends last.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
     taken does not start at once later.
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
-    there are no more places than SMs, an SM has always served it by then.
+    there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
     units = len(alone)
     waits, shares = units > places, places > sms < units
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
-    drawn = end = last_start = 0.0
+    drawn = moved = end = last_start = 0.0
     begun = -interval
     for i in range(units):
         begun += interval
@@ -39,6 +39,9 @@ def list_schedule(
         if len(draws) > 0:
             drawn = max(drawn, begun) + draws[i]
             begin = drawn
+        if len(moves) > 0:
+            moved = max(moved, begun + start) + moves[i]
+            done = max(done, moved)
         done = max(done, begin + alone[i])
         if done > end:
             end, last_start = done, begun

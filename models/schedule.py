@@ -2,7 +2,7 @@
 
 The machine hands units to places in order: to the place that is free first, a block not sooner after the one before it
 than the block launch rate allows. So while long blocks fill all places nothing starts, and that time is lost: empty
-blocks behind them have to be started one by one. A unit takes its place until three things are over:
+blocks behind them have to be started one by one. A unit takes its place until four things are over:
 
 *Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want a scheduler, or
 the SM, at the same time for at most the smaller of its own work there and theirs, and of two that want the same each
@@ -11,6 +11,9 @@ longest one of each SM, a share an SM.
 
 *Its SM.* Schedulers, execution units, shared memory and load path (the fullest) serve units in order, as many at a time
 as there are SMs. A block's first request comes a block start after it got its place.
+
+*Memory.* DRAM or L2, the fuller of the two, serves the bytes of blocks in order. So blocks that find nothing to do
+start only when those before them, which have, leave their places.
 
 *What it draws from.* An item of a queue begins when the draws before it have passed the fullest atomic unit.
 
@@ -57,6 +60,8 @@ class Loads(NamedTuple):
         What it takes by itself.
     draws : ndarray, (units,)
         Of the fullest atomic unit, where units are drawn from a queue; else of length 0.
+    moves : ndarray, (units,)
+        Of the fuller of DRAM and L2, where units are blocks of the grid; else of length 0.
     places : int
         Units that the machine holds together.
     sms : int
@@ -77,6 +82,7 @@ class Loads(NamedTuple):
     own: NDArray[np.float64]
     alone: NDArray[np.float64]
     draws: NDArray[np.float64]
+    moves: NDArray[np.float64]
     places: int
     sms: int
     interval: float
@@ -123,7 +129,9 @@ def load_units(units: Demand, sm: Any, own: Any, alone: Any) -> None:
 
 
 @kernel
-def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, machine: Any, facts: Any) -> Loads:
+def loads(
+    launch: Shape, units: Any, requests: Any, sizes: Any, terms: Any, way: float, machine: Any, facts: Any
+) -> Loads:
     """What the units of a launch load the machine with.
 
     Parameters
@@ -131,8 +139,8 @@ def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, mach
     launch : Shape
     units : tuple of three ndarrays, (units,)
         ``Loads.sm``, ``Loads.own`` and ``Loads.alone``.
-    requests : ndarray, (units,)
-        Atomic requests.
+    requests, sizes : ndarray, (units,)
+        Atomic requests; bytes loaded and stored.
     terms : ndarray, (len(Term),)
     way : float
         The shortest chain.
@@ -145,12 +153,17 @@ def loads(launch: Shape, units: Any, requests: Any, terms: Any, way: float, mach
     memory = max(terms[Term.DRAM], terms[Term.L2])
     if not launch.drawn:
         atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
-        return Loads(
-            sm, own, alone, np.empty(0), places, sms, terms[Term.START] / max(1, count), start, 0.0, memory, atomic, way
-        )
-    total = requests.sum()
-    draws = requests * (terms[Term.QUEUE] / total) if total > 0 else np.full(count, terms[Term.QUEUE] / max(1, count))
-    return Loads(sm, own, alone, draws, places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
+        moves, interval = _shares(sizes, memory), terms[Term.START] / max(1, count)
+        return Loads(sm, own, alone, np.empty(0), moves, places, sms, interval, start, 0.0, memory, atomic, way)
+    draws = _shares(requests, terms[Term.QUEUE])
+    return Loads(sm, own, alone, draws, np.empty(0), places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
+
+
+@kernel
+def _shares(amounts: Any, cycles: float) -> Any:
+    """Deal cycles to units by their amounts; alike where all are 0."""
+    total = amounts.sum()
+    return amounts * (cycles / total) if total > 0 else np.full(len(amounts), cycles / max(1, len(amounts)))
 
 
 @kernel
@@ -175,7 +188,7 @@ def play(units: Loads) -> Played:
 
 @kernel
 def _ends(units: Loads, alone: Any, places: int) -> tuple[float, float]:
-    return list_schedule(units.sm, alone, units.draws, places, units.sms, units.interval, units.start)  # type: ignore[no-any-return]
+    return list_schedule(units.sm, alone, units.draws, units.moves, places, units.sms, units.interval, units.start)  # type: ignore[no-any-return]
 
 
 @kernel

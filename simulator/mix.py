@@ -69,6 +69,8 @@ class KernelMix:
         By event and column: what was fitted of a price.
     uncached : bool
         Whether local memory passes L1 by.
+    in_step : bool
+        As in ``Launch``.
     """
 
     kernel: str
@@ -78,6 +80,7 @@ class KernelMix:
     provenance: dict[str, tuple[str, str]]
     fitted: dict[tuple[str, str], Fitted] = field(default_factory=dict)
     uncached: bool = False
+    in_step: bool = False
 
     @property
     def as_moved(self) -> "KernelMix":
@@ -153,6 +156,7 @@ class Mix:
             shared_bytes=work.shared_bytes + kernel.shared_bytes,
             events=_machine_events(kernel.matrix(work.events, warp), work.table),
             dispatch=work.dispatch,
+            in_step=kernel.in_step,
             streams=(*work.streams, *_local_memory(kernel, work)),
             atomic_requests=work.atomic_requests,
         )
@@ -253,7 +257,8 @@ def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, li
         for column, part in _fitted_parts(price, about[event][0]).items()
     }
     registers, shared_bytes = int(table.get("registers", 16)), int(table.get("shared_bytes", 0))
-    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, bool(table.get("uncached_local")))
+    uncached, in_step = bool(table.get("uncached_local")), bool(table.get("in_step"))
+    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, uncached, in_step)
 
 
 def _fitted_parts(price: dict[str, Any], kind: str) -> dict[str, float]:

@@ -71,11 +71,12 @@ def test_a_kernel_without_a_mix_is_refused():
 
 
 def test_a_launch_has_the_works_shape_and_the_mixs_prices():
-    mix = Mix("p/cc1", {"k": KernelMix("k", 21, 100, {"STEPS": {"fp32": 3, "shared": 2}}, {})}, "")
+    mix = Mix("p/cc1", {"k": KernelMix("k", 21, 100, {"STEPS": {"fp32": 3, "shared": 2}}, {}, in_step=True)}, "")
     table = np.array([[1, 32, 5], [2, 40, 7]], np.int64)
     work = Work(stage="s", kernel="k", events=Event, table=table, grid=2, block=64, shared_bytes=16)
     launch = mix.launch(work, 32)
     assert (launch.registers, launch.shared_bytes, launch.grid, launch.block) == (21, 116, 2, 64)
+    assert launch.in_step
     columns = [MachineEvent.FP32, MachineEvent.SHARED, MachineEvent.LANES, MachineEvent.LOAD_TRANSACTIONS]
     assert launch.events[:, columns].tolist() == [[3, 2, 5 * 32, 5], [6, 4, 10 * 32, 7]]
 
@@ -152,6 +153,13 @@ def test_an_event_of_instructions_that_passes_through_is_one_instruction_of_its_
 @pytest.mark.parametrize(("capability", "family"), [("1.3", "cc1"), ("3.0", "cc1"), ("8.6", "cc1"), ("9.0", "cc9")])
 def test_the_newest_family_that_is_not_newer_is_taken(capability, family):
     assert load_mix("micropolygon", capability).name == f"micropolygon/{family}"
+
+
+def test_a_kernel_that_a_file_has_no_table_for_is_that_of_the_older_file_which_it_names():
+    new, old = load_mix("binned", "9.0"), load_mix("binned", "8.6")
+    assert new.kernels["ROP_before"].prices == old.kernels["ROP_before"].prices
+    assert new.kernels["ROP"].registers == 38
+    assert new.digest != old.digest
 
 
 def test_an_older_machine_takes_the_oldest_family():

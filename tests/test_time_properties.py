@@ -185,27 +185,30 @@ def test_the_spread_stays_where_another_unit_ends_last():
     places=st.integers(1, 17),
     sms=st.integers(1, 9),
     queue=st.booleans(),
+    moving=st.booleans(),
 )
-def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, queue):
+def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, queue, moving):
     """The same by two lists that are sorted after each unit."""
     random = np.random.default_rng(seed)
-    sm, alone, draws = (random.exponential(size, units) for size in (2.0, 9.0, 0.5))
-    free, served, drawn, end, begun = [0.0] * places, [0.0] * sms, 0.0, 0.0, -0.3
+    sm, alone, draws, moves = (random.exponential(size, units) for size in (2.0, 9.0, 0.5, 0.8))
+    free, served, drawn, moved, end, begun = [0.0] * places, [0.0] * sms, 0.0, 0.0, 0.0, -0.3
     for i in range(units):
         begun = max(free[0], begun + 0.3)
         served[0] = max(served[0], begun + 0.7) + sm[i]
         drawn = max(drawn, begun) + draws[i]
-        free[0] = max(served[0], (drawn if queue else begun) + alone[i])
+        moved = max(moved, begun + 0.7) + moves[i] if moving else 0.0
+        free[0] = max(served[0], moved, (drawn if queue else begun) + alone[i])
         end = max(end, free[0])
         free, served = sorted(free), sorted(served)
-    got = list_schedule(sm, alone, draws if queue else np.empty(0), places, sms, 0.3, 0.7)
+    nothing = np.empty(0)
+    got = list_schedule(sm, alone, draws if queue else nothing, moves if moving else nothing, places, sms, 0.3, 0.7)
     assert got[0] == pytest.approx(end, rel=1e-12)
 
 
 def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_later():
     """One place: a block of 10 from 0 on, then empty blocks at 10, 11, 12 and 13."""
     nothing, alone = np.zeros(5), np.array([10.0, 0.0, 0.0, 0.0, 0.0])
-    assert list_schedule(nothing, alone, np.empty(0), 1, 1, 1.0, 0.0)[0] == 13.0
+    assert list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, 1.0, 0.0)[0] == 13.0
 
 
 def launch_of(units, block=64, shared_bytes=0, requests=None, **events):

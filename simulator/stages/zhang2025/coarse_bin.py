@@ -21,8 +21,8 @@ TILES_A_ROW = BIN // TILE
 TILES = TILES_A_ROW**2
 CHUNK = 512  # queue entries
 # how long a warp is at a tile, in cycles of one alone by the compiler's schedule: all fail the tests before depth; some
-# lane has its depth tested; passes; and for each lane that lowers the tile's, at one address
-_TILE, _TESTED, _KEPT, _UPDATED = 25, 80, 60, 16
+# lane has its depth tested; passes; lowers the tile's; and for each lane that does, at one address
+_TILE, _TESTED, _KEPT, _UPDATED, _LANE = 66, 76, 98, 56, 16
 _ARRIVED = 2**62
 _ZERO = np.float32(0.0)
 
@@ -53,13 +53,14 @@ class CoarseRasterizerEvent(IntEnum):
     STORE_BYTES = 20
     SUB_QUEUES = 21  # of the binning blocks, asked one after another
     FILLS = 22  # of them, those with primitives of this bin
-    CRITICAL_HI_Z_STEPS = 23  # of the warp with most of them, round by round: the others wait for it
+    CRITICAL_HI_Z_STEPS = 23  # of the warp that takes longest, round by round: the others wait for it
     CRITICAL_APPEND_STEPS = 24  # the same of the appends
     KEPT_STEPS = 25  # warp executions of what follows a depth test that some lane passes
     KEPT_LANES = 26
     CHUNK_STEPS = 27  # warp steps of the append in which a lane goes on to a new chunk of its queue
     CHUNK_SECTORS = 28  # pairs of tiles that do so in one step: their numbers of chunks share a sector
     BLOCKS = 29
+    CRITICAL_UPDATE_STEPS = 30  # of the warp of CRITICAL_HI_Z_STEPS: steps in which a lane lowers a tile's depth
 
 
 @kernel(error_model="numpy")
@@ -122,7 +123,7 @@ def _tile_of_warp(
     row[CoarseRasterizerEvent.HI_Z_UPDATES] += updates
     row[CoarseRasterizerEvent.SHARED_ATOMIC] += updates > 0
     row[CoarseRasterizerEvent.BANK_REPLAYS] += max(0, updates - 1)  # one address
-    return _TESTED * (passed > 0) + _KEPT * (kept > 0) + _UPDATED * updates, lowered
+    return _TESTED * (passed > 0) + _KEPT * (kept > 0) + (_UPDATED + _LANE * updates) * (updates > 0), lowered
 
 
 @kernel(error_model="numpy")
@@ -132,13 +133,14 @@ def _test_round(
 ) -> None:  # fmt: skip
     """Walk the tiles with all warps of a round, always the one that is behind; sets ``masks`` (256, primitives)."""
     warps = -(-len(listed) // warp)
-    clock, following, steps = np.zeros(warps, np.int64), np.zeros(warps, np.int64), np.zeros(warps, np.int64)
+    clock, following, steps = np.zeros(warps, np.int64), np.zeros(warps, np.int64), np.zeros((warps, 2), np.int64)
+    longest = 0
     lowered = np.full(warps, NO_DEPTH, np.int64)  # by a warp that still is at its last tile
     spans = np.empty((warps, 4), np.int64)
     for w in range(warps):
         spans[w] = _tiles_of(boxes, listed[w * warp : (w + 1) * warp], origin_x, origin_y)
     for _ in range(warps * TILES):
-        w = clock.argmin()
+        w = int(clock.argmin())
         tile = following[w]
         hi_z[tile - 1] = min(hi_z[tile - 1], lowered[w])
         lowered[w] = NO_DEPTH
@@ -153,14 +155,17 @@ def _test_round(
                 edges, planes, boxes, listed[lanes], left, bottom, hi_z[tile], tile, margin, masks[:, lanes], row
             )
             clock[w] += taken
-            steps[w] += row[CoarseRasterizerEvent.HI_Z_STEPS] - before
+            steps[w, 0] += row[CoarseRasterizerEvent.HI_Z_STEPS] - before
+            steps[w, 1] += lowered[w] != NO_DEPTH
         following[w] += 1
         if following[w] == TILES:
+            longest = w  # the last one to arrive
             clock[w] = _ARRIVED
     hi_z[TILES - 1] = min(hi_z[TILES - 1], lowered.min())
     row[CoarseRasterizerEvent.WARPS] += warps
     row[CoarseRasterizerEvent.WARP_LANES] += len(listed)
-    row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += steps.max()
+    row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += steps[longest, 0]
+    row[CoarseRasterizerEvent.CRITICAL_UPDATE_STEPS] += steps[longest, 1]
 
 
 @kernel(error_model="numpy")

@@ -20,7 +20,14 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.zhang2025.coarse_bin import BLOCK, CHUNK, TILES, TILES_A_ROW, CoarseRasterizerEvent, rasterize_bin
+from tilestamp.simulator.stages.zhang2025.coarse_bin import (
+    BLOCK,
+    CHUNK,
+    TILES,
+    TILES_A_ROW,
+    CoarseRasterizerEvent,
+    rasterize_bin,
+)
 from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
 from tilestamp.simulator.stages.zhang2025.triangle_setup import SETUP_BYTES, TriangleSetupData
 from tilestamp.simulator.work import Work

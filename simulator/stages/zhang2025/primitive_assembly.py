@@ -126,7 +126,7 @@ def _primitive_assembly(
 
 @kernel(error_model="numpy")
 def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int, events: Any) -> None:
-    """Vertex fetches through the indices, and the atomics of the clipped lanes, warp by warp."""
+    """Indices, the vertices that they fetch, and the atomics of the clipped lanes, warp by warp."""
     addresses = np.empty(warp, np.int64)
     for first in range(0, len(triangles), warp):
         row = events[first // BLOCK]
@@ -137,6 +137,11 @@ def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int
             count, size = transactions(addresses, warp, 4, rule)
             row[PrimitiveAssemblyEvent.LOAD_TRANSACTIONS] += count * (VERTEX_BYTES // 4)
             row[PrimitiveAssemblyEvent.LOAD_BYTES] += size * (VERTEX_BYTES // 4)
+            for lane in range(warp):
+                addresses[lane] = (3 * (first + lane) + k) * 4 if first + lane < len(triangles) else -1
+            count, size = transactions(addresses, warp, 4, rule)
+            row[PrimitiveAssemblyEvent.LOAD_TRANSACTIONS] += count
+            row[PrimitiveAssemblyEvent.LOAD_BYTES] += size
         for lane in range(warp):
             addresses[lane] = 0 if first + lane < len(triangles) and clipped[first + lane] else -1
         lanes, merged, conflicts, depth = count_atomics(addresses, warp, merge)
