@@ -197,8 +197,8 @@ def test_dependent_steps_wait_one_after_another(events, cycles):
 def test_warps_in_step_wait_for_their_own_way_through_l1_too():
     """80 bytes stored at 8 a clock, after a chain of 2 loads and a block's start."""
     what = launch(units=1, block=128, CHAIN_LOAD=2, STORE_BYTES=80, STORE_TRANSACTIONS=3)
-    assert demand(what, MACHINE, NOTHING).alone == 240
-    assert demand(replace(what, in_step=True), MACHINE, NOTHING).alone == 250
+    assert demand(what, MACHINE, 0.0).alone == 240
+    assert demand(replace(what, in_step=True), MACHINE, 0.0).alone == 250
 
 
 def test_a_load_waits_for_dram_by_the_share_that_misses():
