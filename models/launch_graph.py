@@ -19,12 +19,16 @@ class Node:
         What it waits for in a graph.
     shares : bool
         Bound by memory: it shares the bandwidth with others that do.
+    fills : bool
+        Of more blocks than the machine holds: what could run beside it in a graph starts when it ends, as blocks that
+        were launched later wait for places.
     """
 
     name: str
     gpu_us: float
     after: tuple[str, ...] = ()
     shares: bool = False
+    fills: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,8 @@ def on_stream(nodes: Sequence[Node], launch_us: float, sync_us: float) -> FrameT
 def as_graph(nodes: Sequence[Node], step_us: float, sync_us: float) -> FrameTime:
     """Run nodes as soon as what they wait for has ended; the path that ends last decides.
 
-    Nodes that ``shares`` marks divide the memory's bandwidth among those that run together.
+    Nodes that ``shares`` marks divide the memory's bandwidth among those that run together; one that ``fills`` marks
+    lets no other one start beside it, and those that it held up start when it ends.
 
     Parameters
     ----------
@@ -87,8 +92,8 @@ def as_graph(nodes: Sequence[Node], step_us: float, sync_us: float) -> FrameTime
     for node in nodes:
         if any(known[name] >= known[node.name] for name in node.after):
             raise KeyError(node.name)
-    shared = {node.name for node in nodes if node.shares}
-    delayed: dict[str, float] = {}  # start of nodes that wait for nothing any more
+    shared, filling = {node.name for node in nodes if node.shares}, {node.name for node in nodes if node.fills}
+    delayed: dict[str, float] = {}  # start of nodes that wait for nothing any more but a place
     left = {node.name: node.gpu_us for node in nodes}
     now = 0.0
     while waiting or delayed or running:
@@ -99,14 +104,18 @@ def as_graph(nodes: Sequence[Node], step_us: float, sync_us: float) -> FrameTime
             waiting.remove(node)
         pace = {name: 1.0 / max(1, len(shared & running.keys())) if name in shared else 1.0 for name in running}
         next_end = min((now + left[name] / pace[name] for name in running), default=float("inf"))
-        moment = min(next_end, min(delayed.values(), default=float("inf")))
+        starts = () if filling & running.keys() else delayed.values()
+        moment = min(next_end, min(starts, default=float("inf")))
         for name in running:
             left[name] -= (moment - now) * pace[name]
         now = moment
         for name in [n for n in running if left[n] <= ROUNDING_US]:
             end[name] = now
             del running[name]
+            for held in [n for n, start in delayed.items() if name in filling and start <= now]:
+                delayed[held], path[held] = now, (*path[name], held)
         for name in [n for n, start in delayed.items() if start <= now]:
-            running[name] = delayed.pop(name)
+            if not filling & running.keys():
+                running[name] = delayed.pop(name)
     longest = max(end, key=lambda name: end[name])
     return FrameTime(end[longest], end[longest] + sync_us, path[longest])

@@ -306,6 +306,14 @@ def test_a_stream_runs_nodes_one_after_another():
     assert (frame.gpu_us, frame.cpu_us, frame.path) == (29.0, 34.0, ("a", "b", "c", "d"))
 
 
+def test_what_fills_the_machine_holds_up_what_could_run_beside_it():
+    """A and the clear from 1; b, which waits for a alone, not before the clear's end at 21."""
+    nodes = (Node("a", 3.0), Node("clear", 20.0, fills=True), Node("b", 4.0, ("a",)), Node("c", 2.0, ("b", "clear")))
+    frame = as_graph(nodes, 1.0, 0.0)
+    assert frame.gpu_us == pytest.approx(21 + 4 + 1 + 2)
+    assert frame.path == ("clear", "b", "c")
+
+
 def test_branches_of_a_graph_share_bandwidth():
     """A to 11; b and c from 12 at half speed: b to 20, c then has 2 left, to 22; d from 21 to 22."""
     frame = as_graph(NODES, 1.0, 5.0)

@@ -7,38 +7,40 @@ import pandas as pd
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.zhang2025.setting import HEIGHT, SOURCE, WIDTH, bunny, draw, published
 from tilestamp.models.fitted import Fitted
+from tilestamp.models.launch import Launch
 from tilestamp.models.launch_graph import Node, as_graph, on_stream
-from tilestamp.models.machine import Machine, load_machine
+from tilestamp.models.machine import load_machine
 from tilestamp.reports.plots import stacked_bars
+from tilestamp.simulator.run import Run
+from tilestamp.simulator.work import Work
 
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINE = "ga104"
-PIXELS = WIDTH * HEIGHT
-TRIANGLES = 4968
-BINS, TILES, QUEUES, WAVES = 256, 256, 4, 2046  # his buffers have room for so many
-# What he clears or copies before the stages in each frame, in bytes, and the stage that waits for it (his graph).
-CLEARS = {
-    "Matrices": (64, "VertexFetchAndShading"),
-    "TrunkAllocator": (4, "PrimitiveBinning"),
-    "TileTrunkAllocator": (4, "CoarseRasterizer"),
-    "QuadAllocator": (4, "FineRasterizer"),
-    "SubTriangleCounter": (4, "PrimitiveAssembly"),
-    "FragmentStream": (48 * 4 * PIXELS, "FineRasterizer"),
-    "RenderTarget": (16 * PIXELS, "ROP"),
-    "HiZ": (4 * BINS * TILES, "CoarseRasterizer"),
-    "DepthBuffer": (4 * PIXELS, "FineRasterizer"),
-    "PrimitiveStream": (4 * TRIANGLES * 112, "PrimitiveAssembly"),
-    "PixelBaseIdx": (4 * PIXELS, "PixelShader"),
-    "SubQueuePrimCount": (4 * WAVES * 256, "PrimitiveBinning"),
-    "TileQueuePrimCount": (4 * BINS * TILES * QUEUES, "CoarseRasterizer"),
+# Which stage waits for a buffer to be cleared (his graph).
+TARGETS = {
+    "bin_allocator": "PrimitiveBinning",
+    "tile_allocator": "CoarseRasterizer",
+    "quad_allocator": "FineRasterizer",
+    "slot_counter": "PrimitiveAssembly",
+    "fragments": "FineRasterizer",
+    "target": "ROP",
+    "hi_z": "CoarseRasterizer",
+    "depth": "FineRasterizer",
+    "primitives": "PrimitiveAssembly",
+    "pixel_base": "PixelShader",
+    "bin_counts": "PrimitiveBinning",
+    "tile_counts": "CoarseRasterizer",
+    "Matrices": "VertexFetchAndShading",
 }
 # Compaction clears its two buffers before the kernel, on its own stream, and copies the count after it.
 ORDER = (
-    "VertexFetchAndShading", "PrimitiveAssembly", "BlockSums", "Sum", "PrimitiveCompaction", "PrimitiveCount",
+    "VertexFetchAndShading", "PrimitiveAssembly", "block_sums", "block_sum", "PrimitiveCompaction", "PrimitiveCount",
     "TriangleSetup", "PrimitiveBinning", "CoarseRasterizer", "FineRasterizer", "PixelShader", "ROP",
 )  # fmt: skip
-COPIES = {"BlockSums": 4096, "Sum": 4, "PrimitiveCount": 4}  # bytes
+CLEARS = "Clears"  # the stage
+CLEARED = ("block_sums", "block_sum")
+COPIES = ("Matrices", "PrimitiveCount")  # a few bytes each
 LAST = "StreamingToFrameBuffer"  # outside of the graph, after the window's buffer is mapped
 WAITS = {"PrimitiveBinning": ("PrimitiveCount",), "CoarseRasterizer": ("PrimitiveBinning", "TriangleSetup")}
 MAPPING_CALLS = 4  # assumed: to map and to unmap, the driver submits to both of its contexts
@@ -48,19 +50,31 @@ GAP = "zhang2025: microseconds between calls"
 SAME = {"gpu_time": "gpu_time_rasterize_pipeline", "total_frame_time": "cpu_time"}  # ours: one number in two rows
 
 
-def nodes(times: dict[str, float], machine: Machine) -> list[Node]:
-    """All launches, copies and clears of a frame but the last, with what they wait for."""
-    bandwidth = machine.memory.dram_gb_per_s * machine.memory.dram_efficiency * 1e3  # bytes a microsecond
-    copied = {name: machine.launch.kernel_us + size / bandwidth for name, size in COPIES.items()}
-    clears = [
-        Node(name, machine.launch.kernel_us + size / bandwidth, shares=True) for name, (size, _) in CLEARS.items()
+def nodes(run: Run) -> list[Node]:
+    """All launches, copies and clears of a frame, with what they wait for; the last one is outside of the graph."""
+    places = {work.variant or work.stage: i for i, work in enumerate(run.frame.works) if isinstance(work, Work)}
+    return [
+        *(_node(run, places, name, ()) for name in TARGETS),
+        *(_node(run, places, stage, _before(stage)) for stage in ORDER),
+        _node(run, places, LAST, ()),
     ]
-    stages = []
-    for i, stage in enumerate(ORDER):
-        before = WAITS.get(stage, ORDER[i - 1 : i])
-        cleared = tuple(name for name, (_, target) in CLEARS.items() if target == stage)
-        stages.append(Node(stage, copied[stage] if stage in copied else times[stage], (*cleared, *before)))
-    return clears + stages
+
+
+def _before(stage: str) -> tuple[str, ...]:
+    """What a stage waits for: buffers that are cleared, and the stages before it."""
+    cleared = tuple(name for name, target in TARGETS.items() if target == stage)
+    first = ORDER.index(stage)
+    return (*cleared, *WAITS.get(stage, ORDER[max(0, first - 1) : first]))
+
+
+def _node(run: Run, places: dict[str, int], name: str, after: tuple[str, ...]) -> Node:
+    """One launch by its buffer's or stage's name; a copy takes what a kernel without work takes."""
+    if name in COPIES:
+        return Node(name, run.machine.launch.kernel_us, after)
+    launch, timing = run.launches[places[name]], run.timings[places[name]]
+    assert isinstance(launch, Launch)  # noqa: S101 - no fixed function in this pipeline
+    fills = launch.grid > timing.details["resident_blocks"] * run.machine.sm.count
+    return Node(name, 1e3 * timing.milliseconds, after, shares=launch.stage == CLEARS, fills=fills)
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -79,10 +93,7 @@ def run(progress: Callable[[str], None]) -> Result:
         )
     machine = load_machine(MACHINE)
     progress(MACHINE)
-    stages = draw(scene, MACHINE).stages.milliseconds
-    times = {str(stage): 1e3 * float(ms) for stage, ms in stages.items()}
-    frame = nodes(times, machine)
-    last = Node(LAST, times[LAST])
+    *frame, last = nodes(draw(scene, MACHINE))
     asked = {str(row["metric"]): row for row in published("graph").to_dict("records")}
     busy = on_stream([*frame, last], 0.0, 0.0).gpu_us
     between = (1e3 * float(asked[FITTED[0]][f"{FITTED[1]}_ms"]) - busy) / (len(frame) + 1)
@@ -90,7 +101,7 @@ def run(progress: Callable[[str], None]) -> Result:
     stream = on_stream([*frame, last], gap, 0.0).gpu_us
     graph = as_graph(frame, gap, 0.0)
     mapping = MAPPING_CALLS * gap
-    ended = graph.gpu_us + mapping + times[LAST]
+    ended = graph.gpu_us + mapping + last.gpu_us
     pairs = {
         "gpu_time_rasterize_pipeline": (stream, graph.gpu_us),
         "gpu_time": (stream, ended),
@@ -118,7 +129,7 @@ def run(progress: Callable[[str], None]) -> Result:
         f"Critical path of the graph: {' > '.join(graph.path)}.",
         (
             f"On the stream the kernels take {kernels / 1e3:.2f} ms and clears and copies {cleared / 1e3:.2f} ms, "
-            f"{CLEARS['FragmentStream'][0] / 1e6:.0f} MB of them the fragment stream; the rest is gaps."
+            "most of it the fragment stream's; the rest is gaps."
         ),
         (
             f"The only constant: {gap:.0f} us from the end of a call to the start of one that waits for it, on "
@@ -149,7 +160,7 @@ def _table(frame: list[Node], path: tuple[str, ...]) -> pd.DataFrame:
         [
             {
                 "node": node.name,
-                "kind": "clear" if node.name in CLEARS or node.name in COPIES else "kernel",
+                "kind": "clear" if node.name in TARGETS or node.name in CLEARED or node.name in COPIES else "kernel",
                 "gpu_us": node.gpu_us,
                 "after": " ".join(node.after),
                 "critical": node.name in path,

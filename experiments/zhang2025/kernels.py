@@ -110,7 +110,8 @@ def _notes() -> list[str]:
 
 def profile(frame: Run) -> dict[str, Timing]:
     """Price each kernel by itself, as Nsight Compute runs them: it empties the caches before each."""
-    return {launch.stage: price([launch], frame.machine, "schedule")[0] for launch in frame.launches}
+    kernels = [launch for launch in frame.launches if launch.stage != "Clears"]
+    return {launch.stage: price([launch], frame.machine, "schedule")[0] for launch in kernels}
 
 
 def _saved(cells: list[Cell], machine: str) -> list[Cell]:

@@ -17,6 +17,7 @@ from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
+from tilestamp.simulator.stages.zhang2025.frame_clears import frame_clears
 from tilestamp.simulator.stages.zhang2025.pixel_shader import OVERDRAW, Filter, pixel_shader
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from tilestamp.simulator.stages.zhang2025.primitive_binning import primitive_binning
@@ -66,7 +67,7 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
 def binned(
     scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BinnedOptions, execute: Executor
 ) -> Frame:
-    """Textured triangles through bins, tiles, quads and fragment lists (Zhang 2025).
+    """Textured triangles through bins, tiles, quads and fragment lists, after a frame's clears (Zhang 2025).
 
     Parameters
     ----------
@@ -83,6 +84,7 @@ def binned(
     )
     opaque = options.order == "api"
 
+    execute(frame_clears, len(mesh.triangles), width * height, simt)
     vertices = execute(vertex_fetch_and_shading, mesh, matrix, simt).outputs
     slots = execute(primitive_assembly, mesh, vertices, width, height, simt, culling=options.cull_backfaces).outputs
     primitives = execute(primitive_compaction, slots, len(mesh.triangles), simt).outputs

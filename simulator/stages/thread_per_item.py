@@ -53,6 +53,7 @@ def thread_per_item(
     loads: tuple[Access, ...] = (),
     stores: tuple[Access, ...] = (),
     idle_blocks: int = 0,
+    variant: str = "",
 ) -> Work:
     """Make the work table of a kernel whose thread i handles item i.
 
@@ -68,6 +69,8 @@ def thread_per_item(
     loads, stores : tuple of Access
     idle_blocks : int
         Further blocks of the launch, whose threads find no item.
+    variant : str
+        As in ``Work``.
 
     Returns
     -------
@@ -102,6 +105,7 @@ def thread_per_item(
         grid=len(table),
         block=block,
         streams=tuple(streams),
+        variant=variant,
     )
 
 

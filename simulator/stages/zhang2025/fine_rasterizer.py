@@ -118,7 +118,7 @@ def fine_rasterizer(
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),
         Stream("setup", "load", 160 * int(total[FineRasterizerEvent.ROUND_LANES]), drawn * SETUP_BYTES),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments", "store", FRAGMENT_OUT * quads, FRAGMENT_BYTES * quads),
+        Stream("fragments", "store", FRAGMENT_OUT * quads, FRAGMENT_BYTES * quads, 4 * FRAGMENT_BYTES),
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"

@@ -32,6 +32,7 @@ from tilestamp.simulator.work import Work
 
 OVERDRAW = 4  # fragments a pixel that the stream has room for
 FRAGMENT_OUT_BYTES = 32
+AT_ONCE = 1 << 16  # bytes: what a warp stores again, or another one of the tile, it does at once
 FILTERS = {"nearest": NEAREST, "bilinear": BILINEAR, "trilinear": TRILINEAR}
 Filter = Literal["nearest", "bilinear", "trilinear"]
 
@@ -143,8 +144,8 @@ def pixel_shader(
     streams = (
         Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
         Stream("texture", "load", texels, texels),
-        Stream("fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES),
-        Stream("pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), min(16 * count, 4 * pixels)),
+        Stream("fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES, AT_ONCE),
+        Stream("pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), min(16 * count, 4 * pixels), AT_ONCE),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     work = Work(
