@@ -1,17 +1,22 @@
 """H200, Zhang 2025: the author's kernels beside ours, on the same inputs, and his frames on a stream and as a graph.
 
 Every kernel and clear of a frame without a texture, and of one with (``textured_inputs``), drawn with the author's own
-faults: whole blocks of tiles, and Hi-Z without a margin. What of a frame is neither kernel nor clear is gaps between
-them: two constants, fitted to the frames of two scenes.
+faults: whole blocks of tiles, and Hi-Z without a margin. Between the launches of a stream lies a gap, a constant that
+was fitted to the frames of one scene; the graph takes the machine file's step.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from tilestamp.experiments.harness.result import Result
-from tilestamp.experiments.silicon.textured_compare import FRAME_TIME, Drawn, by_kernel, cells, entry, rows, sentences
-from tilestamp.experiments.silicon.textured_inputs import VARIABLE, Measured, measured_scenes, read_measured
+from tilestamp.experiments.silicon.textured_compare import SPAN, Drawn, by_kernel, cells, entry, rows, sentences
+from tilestamp.experiments.silicon.textured_inputs import (
+    SPAN_METRIC,
+    VARIABLE,
+    Measured,
+    measured_scenes,
+    read_measured,
+)
 from tilestamp.experiments.zhang2025.graph import nodes
 from tilestamp.models.errors import MissingInputError
 from tilestamp.models.fitted import Fitted
@@ -19,9 +24,7 @@ from tilestamp.models.launch_graph import as_graph, on_stream
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.zhang2025.frame_clears import cleared_bytes
-
-if TYPE_CHECKING:
-    import pandas as pd
+from tilestamp.simulator.work import Work
 
 SLOW = True  # draws every measured frame
 
@@ -29,11 +32,18 @@ NAME = "silicon-textured_binned"
 TITLE = "H200, Zhang 2025's kernels, model against machine"
 SOURCE = f"One NVIDIA H200, 2026-11-29: the folder that {VARIABLE} names"
 KERNELS = {"PrimitiveCompaction": "PrimitiveCompactionKernel", "FineRasterizer": "FineRasterizerWIP"}  # his other names
-CONFIGS = {"stream": False, "stream_textured": True}  # has a texture
-SPAN = "us_span"  # first start to last end
-GAPS = {  # microseconds between nodes
-    "stream": Fitted("zhang2025 on an H200: gap on a stream", 1.85, ("zh_Duck_fit | silicon-textured_binned | *",)),
-    "graph": Fitted("zhang2025 on an H200: gap in a graph", 1.0, ("zh_Duck_fit | silicon-textured_binned | *",)),
+GAP = Fitted("zhang2025 on an H200: microseconds between launches", 1.85, (f"zh_Duck_fit | {NAME}",))
+OPTIONS = {"original_faults": True, "texture_levels": 4, "texture_layout": "rows"}
+EVENTS = {  # of the sources on a CPU: kernel, metric, ours, how many of ours are one of theirs
+    ("PrimitiveCompactionKernel", "primitives_kept"): ("PrimitiveCompaction.KEPT", 1),
+    ("PrimitiveBinning", "bin_entries"): ("PrimitiveBinning.ENTRIES", 1),
+    ("PrimitiveBinning", "bin_chunks"): ("PrimitiveBinning.CHUNKS", 1),
+    ("CoarseRasterizer", "rounds"): ("CoarseRasterizer.ROUNDS", 1),
+    ("CoarseRasterizer", "edge_lanes"): ("CoarseRasterizer.EDGE_LANES", 1),
+    ("CoarseRasterizer", "hi_z_lanes"): ("CoarseRasterizer.HI_Z_LANES", 1),
+    ("FineRasterizerWIP", "rounds"): ("FineRasterizer.ROUNDS", 1),
+    ("FineRasterizerWIP", "sample_hits"): ("FineRasterizer.SAMPLE_HITS", 1),
+    ("FineRasterizerWIP", "fragments"): ("FineRasterizer.QUADS", 0.25),
 }
 
 
@@ -48,17 +58,68 @@ def run(progress: Callable[[str], None]) -> Result:
     found: list[dict[str, Any]] = []
     for name in names:
         measured = read_measured(name)
-        for config, textured in CONFIGS.items():
+        for config in ("stream", "stream_textured"):
             progress(f"{name} {config}")
-            drawn = draw(measured, textured=textured)
-            found += rows(measured, Drawn(config, drawn, [kernel_name(measured, drawn, work) for work in range(len(drawn.frame.works))]))
-            found += frames(measured, drawn, config)
+            found += _rows(measured, config)
     table = pd.DataFrame(found)
     return Result(
         name=NAME,
         title=TITLE,
         source=SOURCE,
         cells=cells(table),
-        notes=[*sentences(table), *_events(names)],
+        notes=sentences(table),
         tables={"all": table, "kernels": by_kernel(table)},
     )
+
+
+def _rows(measured: Measured, config: str) -> Iterator[dict[str, Any]]:
+    """One frame: its kernels, what goes on between them, and the events of the sources on a CPU."""
+    drawn = draw(measured, textured=config == "stream_textured")
+    kernels = [kernel_name(work, drawn) for work in drawn.frame.works if isinstance(work, Work)]
+    if ("stream", "ROP", 0, "us_median") not in measured.on_gpu:  # the original stops there
+        kernels = ["" if kernel == "ROP" else kernel for kernel in kernels]
+    yield from rows(measured, Drawn(config, drawn, kernels))
+    about = {"scene": measured.name, "kernel": "frame", "instance": 0}
+    for way, ours in spans(drawn).items():
+        kind = config if way == "stream" else way
+        place = (kind, "frame", 0, SPAN_METRIC)
+        if place in measured.on_gpu and (way == "stream" or config == "stream") and "" not in kernels:
+            yield about | {"config": kind} | entry(SPAN, ours, measured.on_gpu[place], 0.08)
+    if config == "stream":
+        for (kernel, metric), (event, share) in EVENTS.items():
+            theirs = measured.on_cpu["counts", kernel, metric]
+            yield (
+                about | {"config": "counts", "kernel": kernel} | entry(metric, drawn.counts[event] / share, theirs, 0.0)
+            )
+
+
+def draw(measured: Measured, *, textured: bool) -> Run:
+    """Draw one frame as the author's program does."""
+    from dataclasses import replace
+
+    scene = measured.scene
+    if not textured and scene.mesh is not None:
+        scene = replace(scene, mesh=replace(scene.mesh, texture_ids=None, textures=()))
+    return simulate(
+        scene, "binned", "h200", width=measured.width, height=measured.height, camera=measured.matrix, **OPTIONS
+    )
+
+
+def kernel_name(work: Work, frame: Run) -> str:
+    """The author's name of one of our kernels; memsets go by their bytes."""
+    if work.variant:
+        sizes = cleared_bytes(frame.counts["PrimitiveAssembly.WARP_LANES"], frame.width * frame.height)
+        return f"memset{sizes[work.variant]}"
+    if work.stage == "PixelShader" and frame.counts["PixelShader.TEXTURED_WARPS"]:
+        return "PixelShaderTex"
+    return KERNELS.get(work.stage, work.stage)
+
+
+def spans(frame: Run) -> dict[str, float]:
+    """Microseconds from a frame's first start to its last end: on one stream, and as the author's graph."""
+    *graph, last = nodes(frame)
+    step = frame.machine.launch.graph_us
+    return {
+        "stream": on_stream([*graph, last], GAP.value, 0.0).gpu_us,
+        "graph": as_graph(graph, step, 0.0).gpu_us + step + last.gpu_us,
+    }

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FRAME_TIME = "frame time"  # sum of the kernels and memsets
+SPAN = "frame from start to end"
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,19 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
         about = {"scene": measured.name, "config": drawn.config, "kernel": kernel, "instance": instance}
         timed = (drawn.config, kernel, instance, TIME_METRIC)
         if timed in measured.on_gpu:
+<<<<<<< HEAD
             yield about | _entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
         for config in (drawn.config, *drawn.counted_as):
+=======
+            yield about | entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
+        for config in filter(None, (drawn.config, drawn.counted_as)):
+>>>>>>> 16f154e (wip: clears, graph, experiment)
             place = (config, kernel, instance)
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
             yield from (about | entry for entry in _counters(launch, counters, drawn))
     about = {"scene": measured.name, "config": drawn.config, "kernel": "frame", "instance": 0}
     whole = sum(time for time, kernel in zip(times, drawn.kernels, strict=True) if kernel)
-    yield about | _entry(FRAME_TIME, whole, measured.on_gpu[drawn.config, "frame", 0, FRAME_METRIC], None)
+    yield about | entry(FRAME_TIME, whole, measured.on_gpu[drawn.config, "frame", 0, FRAME_METRIC], None)
 
 
 def _counters(launch: Launch | PipeLaunch, counters: dict[str, float], drawn: Drawn) -> Iterator[dict[str, Any]]:
@@ -75,17 +81,18 @@ def _counters(launch: Launch | PipeLaunch, counters: dict[str, float], drawn: Dr
     for quantity in QUANTITIES:
         parts = [counters[metric] for metric in quantity.metrics if metric in counters]
         if parts and (sum(parts) or quantity.aim):
-            yield _entry(quantity.name, quantity.ours(launch), sum(parts), quantity.aim, absolute=quantity.absolute)
+            yield entry(quantity.name, quantity.ours(launch), sum(parts), quantity.aim, absolute=quantity.absolute)
     if "launch__registers_per_thread" in counters:
-        yield _entry("registers", float(launch.registers), counters["launch__registers_per_thread"], None)
+        yield entry("registers", float(launch.registers), counters["launch__registers_per_thread"], None)
     cold = traffic([launch], drawn.run.machine)[0]
     for moved in MOVED:
         theirs = sum(w * counters.get(metric, 0.0) for metric, w in moved.metrics)
         if moved.metrics[0][0] in counters and theirs > 0:
-            yield _entry(moved.name, moved.ours(launch, cold), theirs, MOVED_AIM)
+            yield entry(moved.name, moved.ours(launch, cold), theirs, MOVED_AIM)
 
 
-def _entry(quantity: str, ours: float, theirs: float, aim: float | None, *, absolute: bool = False) -> dict[str, Any]:
+def entry(quantity: str, ours: float, theirs: float, aim: float | None, *, absolute: bool = False) -> dict[str, Any]:
+    """Ours beside what was measured; the error is relative unless ``absolute``."""
     error = ours - theirs if absolute else ours / theirs - 1.0 if theirs else float(ours > 0)
     return {"quantity": quantity, "ours": ours, "measured": theirs, "error": error, "aim": aim}
 
@@ -117,7 +124,7 @@ def _sentence(r: dict[Any, Any]) -> str:
 
 def cells(table: "pd.DataFrame") -> list[Cell]:
     """Times over 5 us, frames, and instructions."""
-    shown = table[table.quantity.isin(["instructions", TIME, FRAME_TIME])]
+    shown = table[table.quantity.isin(["instructions", TIME, FRAME_TIME, SPAN])]
     shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]
     return [_cell(r) for r in cast("list[dict[str, Any]]", shown.to_dict("records"))]
 
@@ -125,5 +132,5 @@ def cells(table: "pd.DataFrame") -> list[Cell]:
 def _cell(r: dict[str, Any]) -> Cell:
     """A row of the table as a cell."""
     row, column = f"{r['scene']} {r['config']}", f"{r['kernel']} {r['instance']} {r['quantity']}"
-    unit = "us" if r["quantity"] in {TIME, FRAME_TIME} else ""
+    unit = "us" if r["quantity"] in {TIME, FRAME_TIME, SPAN} else ""
     return Cell(row, column, unit, published=r["measured"], ours=r["ours"], aim=r["aim"], frame=r["scene"])

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 VARIABLE = "TILESTAMP_TEXTURED"
 TIME_METRIC = "us_median"
 FRAME_METRIC = "us_kernels_and_memsets"
+SPAN_METRIC = "us_span"  # of a frame: first start to last end
 TIMED = ("cupti", "cupti_repeat2")  # un-profiled; the mean of what there is
 COUNTED = "ncu_cold"
 READ_BACK = "stats"
@@ -103,7 +104,7 @@ def read_measured(name: str) -> Measured:
 
 def _values(table: "pd.DataFrame") -> dict[tuple[str, str, int, str], float]:
     """Times, counters and what was read back."""
-    times = table.source.isin(TIMED) & table.metric.isin([TIME_METRIC, FRAME_METRIC])
+    times = table.source.isin(TIMED) & table.metric.isin([TIME_METRIC, FRAME_METRIC, SPAN_METRIC])
     chosen = table[times | table.source.isin([COUNTED, READ_BACK])]
     means = chosen.groupby(["config", "kernel", "instance", "metric"], sort=False).value.mean()
     return {(str(c), str(k), int(i), str(m)): float(v) for (c, k, i, m), v in means.items()}

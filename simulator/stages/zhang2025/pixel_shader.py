@@ -144,8 +144,16 @@ def pixel_shader(
     streams = (
         Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
         Stream("texture", "load", texels, texels),
-        Stream("fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES, AT_ONCE),
-        Stream("pixel_base", "atomic", 32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]), min(16 * count, 4 * pixels), AT_ONCE),
+        Stream(
+            "fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES, AT_ONCE
+        ),
+        Stream(
+            "pixel_base",
+            "atomic",
+            32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]),
+            min(16 * count, 4 * pixels),
+            AT_ONCE,
+        ),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     work = Work(
