@@ -13,6 +13,7 @@ from tilestamp import simulate
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.zhang2025.frame_clears import cleared_bytes
 from tilestamp.simulator.stages.zhang2025.primitive_binning import PrimitiveBinningEvent, primitive_binning
 
 SIDE, NEAR, FAR = 48, 32, 8
@@ -92,6 +93,20 @@ def test_primitive_compaction(made):
     expected = {"WARPS": 8, "KEPT": COUNT, "GRID_SYNC": 2, "KEPT_WARPS": 2, "BLOCKS": 1, **atomics(2)}
     loads = 8 * 32 + 28 * COUNT
     assert nonzero(made["PrimitiveCompaction"].counts()) == expected | sectors(load=loads, store=28 * COUNT)
+
+
+def test_triangle_setup(made):
+    """Eight blocks of eight warps, two of which have primitives; a whole warp's words are a sector each."""
+    expected = {"WARPS": 2, "WARP_LANES": COUNT, "BLOCKS": 1, "IDLE_WARPS": 62}
+    assert nonzero(made["TriangleSetup"].counts()) == expected | sectors(load=2 * 32 * 28, store=2 * 32 * 35)
+    moved = {stream.op: stream.bytes for stream in made["TriangleSetup"].streams}
+    assert moved == {"load": COUNT * 112, "store": 32 * 2 * 32 * 35}
+
+
+def test_a_frame_clears_what_the_authors_program_does():
+    """Bytes of the memsets of a frame of 968 triangles at 1920x1080, as they were traced on an H200."""
+    traced = [4] * 5 + [4096, 262144, 433664, 1048576, 2095104, 8294400, 8294400, 33177600, 398131200]
+    assert sorted(cleared_bytes(968, 1920 * 1080).values()) == traced
 
 
 def test_primitive_binning(made):
@@ -204,6 +219,7 @@ def test_pixel_shader(textured):
         "WARPS": warps, "WARP_LANES": 32 * warps, "EMPTY_WARPS": 8 * work.grid - warps, "TEXEL_LOADS": texels,
         "TEXEL_LANES": 32 * texels, "TEXTURE_TRANSACTIONS": texels, "TEXTURE_BYTES": 32 * texels, "ATOMIC": warps,
         "ATOMIC_LANES": 32 * warps, "ATOMIC_DEPTH": warps, "TEXTURED_WARPS": textured * warps,
+        "MAGNIFIED_WARPS": textured * warps,
         "ATOMIC_REQUESTS": NEAR * 15 * 2 * 4 + 6 * NEAR * 10 // 40 * 2 * (3 + 4 * 4),
         "WARPS_LAUNCHED": 8 * work.grid,
         **sectors(load=(96 - 32 * textured) * warps + texels + 8 * work.grid, store=64 * warps),

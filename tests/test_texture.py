@@ -11,6 +11,7 @@ from tilestamp.simulator.scenes.texture import (
     level_of_detail,
     nearest,
     texel_index,
+    texel_step,
     texture_chains,
 )
 
@@ -82,12 +83,14 @@ def test_two_textures_keep_apart():
 
 def test_the_level_of_detail_is_the_log_of_the_longer_derivative(image):
     chains = texture_chains([image])
-    lod = level_of_detail(chains, 0, *map(np.float32, (0.0, 0.25, 0.125, 0.0)))  # 4 texels down, 1 across
+    step = texel_step(chains, 0, *map(np.float32, (0.0, 0.25, 0.125, 0.0)))  # 4 texels down, 1 across
+    assert step == pytest.approx(16.0)
+    lod = level_of_detail(chains, 0, step)
     assert lod == pytest.approx(2.0)
 
 
 def test_magnification_has_level_zero(image):
-    assert level_of_detail(texture_chains([image]), 0, *[np.float32(1e-4)] * 4) == 0.0
+    assert level_of_detail(texture_chains([image]), 0, np.float32(0.9)) == 0.0
 
 
 def test_a_chain_has_as_many_levels_as_asked_for():

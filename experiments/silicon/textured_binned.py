@@ -6,6 +6,7 @@ was fitted to the frames of one scene; the graph takes the machine file's step.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from tilestamp.experiments.harness.result import Result
@@ -33,7 +34,7 @@ TITLE = "H200, Zhang 2025's kernels, model against machine"
 SOURCE = f"One NVIDIA H200, 2026-11-29: the folder that {VARIABLE} names"
 KERNELS = {"PrimitiveCompaction": "PrimitiveCompactionKernel", "FineRasterizer": "FineRasterizerWIP"}  # his other names
 GAP = Fitted("zhang2025 on an H200: microseconds between launches", 1.85, (f"zh_Duck_fit | {NAME}",))
-OPTIONS = {"original_faults": True, "texture_levels": 4, "texture_layout": "rows"}
+OPTIONS: dict[str, Any] = {"original_faults": True, "texture_levels": 4, "texture_layout": "rows"}
 EVENTS = {  # of the sources on a CPU: kernel, metric, ours, how many of ours are one of theirs
     ("PrimitiveCompactionKernel", "primitives_kept"): ("PrimitiveCompaction.KEPT", 1),
     ("PrimitiveBinning", "bin_entries"): ("PrimitiveBinning.ENTRIES", 1),
@@ -95,8 +96,6 @@ def _rows(measured: Measured, config: str) -> Iterator[dict[str, Any]]:
 
 def draw(measured: Measured, *, textured: bool) -> Run:
     """Draw one frame as the author's program does."""
-    from dataclasses import replace
-
     scene = measured.scene
     if not textured and scene.mesh is not None:
         scene = replace(scene, mesh=replace(scene.mesh, texture_ids=None, textures=()))

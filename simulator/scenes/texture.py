@@ -145,16 +145,21 @@ def add_bilinear(chains: TextureChains, texture: int, level: int, u: Any, v: Any
 
 
 @kernel
-def level_of_detail(chains: TextureChains, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
-    """Automatic level: log2 of the longer of the two texel-space derivatives, in [0, last level]."""
+def texel_step(chains: TextureChains, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
+    """Square of the longer of the two derivatives, in texels of the first level."""
     width = np.float32(chains.levels[texture, 0, 1])
     height = np.float32(chains.levels[texture, 0, 2])
     along_x = dudx * width * dudx * width + dvdx * height * dvdx * height
     along_y = dudy * width * dudy * width + dvdy * height * dvdy * height
-    longest = max(along_x, along_y)
-    if not longest > _ONE:
+    return max(along_x, along_y)
+
+
+@kernel
+def level_of_detail(chains: TextureChains, texture: int, step: Any) -> Any:
+    """Automatic level of a squared ``texel_step``: its log2 / 2, in [0, last level]."""
+    if not step > _ONE:
         return np.float32(0.0)
-    return min(_HALF * np.log2(longest), np.float32(chains.counts[texture] - 1))
+    return min(_HALF * np.log2(step), np.float32(chains.counts[texture] - 1))
 
 
 @kernel

@@ -22,6 +22,10 @@ class ThreadEvent(IntEnum):
     LOAD_BYTES = 4
     STORE_BYTES = 5
     BLOCKS = 6  # 1: what a dependent chain is priced on
+    IDLE_WARPS = 7  # that find no item and return
+
+
+GATHERED = 64  # bytes from one record to the next up to which L1 gathers stores (H200: 36 does, 112 and 140 do not)
 
 
 class Access(NamedTuple):
@@ -58,6 +62,7 @@ def thread_per_item(
     """Make the work table of a kernel whose thread i handles item i.
 
     The streams hold each record once: further words of a segment that a warp has just touched come from its L1 or L2.
+    Stores to records that lie far apart leave L1 by themselves, each word's segment.
 
     Parameters
     ----------
@@ -85,6 +90,7 @@ def thread_per_item(
     table[:, ThreadEvent.WARPS] = warps
     table[:, ThreadEvent.WARP_LANES] = lanes
     table[:, ThreadEvent.BLOCKS] = 1
+    table[:, ThreadEvent.IDLE_WARPS] = -(-block // simt.warp) - warps
     streams = []
     moves: tuple[tuple[Literal["load", "store"], tuple[Access, ...]], ...] = (("load", loads), ("store", stores))
     for op, accesses in moves:
@@ -93,10 +99,14 @@ def thread_per_item(
             table[:, ThreadEvent[f"{op.upper()}_TRANSACTIONS"]] += warps * count
             table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
             footprint = items * access.stride
-            moved = min(int(warps.sum()) * size, max(footprint, items * access.words * access.word_bytes))
+            moved = int(warps.sum()) * size
+            if op == "load" or access.stride <= GATHERED:
+                moved = min(moved, max(footprint, items * access.words * access.word_bytes))
             lines = partial_lines(access, simt.warp) if op == "store" else 0
             streams.append(Stream(access.buffer, op, moved, footprint, partial_lines=lines * int(warps.sum())))
-    table = np.concatenate([table, np.zeros((idle_blocks, len(ThreadEvent)), np.int64)])
+    idle = np.zeros((idle_blocks, len(ThreadEvent)), np.int64)
+    idle[:, ThreadEvent.IDLE_WARPS] = -(-block // simt.warp)
+    table = np.concatenate([table, idle])
     return Work(
         stage=stage,
         kernel=kernel,

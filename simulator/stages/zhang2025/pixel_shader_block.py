@@ -17,6 +17,7 @@ from tilestamp.simulator.scenes.texture import (
     level_of_detail,
     nearest,
     texel_index,
+    texel_step,
 )
 from tilestamp.simulator.stages.zhang2025.triangle_setup import COLOR, NORMAL, ONE_OVER_W, UV, evaluate
 
@@ -25,6 +26,7 @@ QUADS_A_WARP = 8
 NEAREST, BILINEAR, TRILINEAR = 0, 1, 2
 AMBIENT = np.float32(0.2)
 DIFFUSE = np.float32(0.8)
+MAGNIFIED = np.float32(0.25)  # texels a pixel, squared: half a texel, level -1
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
@@ -52,6 +54,7 @@ class PixelShaderEvent(IntEnum):
     TEXTURED_WARPS = 15
     WARPS_LAUNCHED = 16  # each reads how long the stream is
     ATOMIC_CONFLICTS = 17
+    MAGNIFIED_WARPS = 18  # warps with a quad of which a texel covers two pixels each way
 
 
 @kernel(error_model="numpy")
@@ -77,14 +80,15 @@ def _light(planes: Any, x: Any, y: Any) -> Any:
 def _shade_quad(
     planes: Any, chains: Any, texture: int, method: int, opacity: Any, place: Any, uv: Any, out: Any
 ) -> Any:
-    """Colours of a quad; returns its level of detail."""
-    lod = _ZERO
+    """Colours of a quad; returns its level of detail, and whether a texel covers more than two pixels each way."""
+    lod, step = _ZERO, _ONE
     if texture >= 0:
         quad_coordinates(planes, place, uv)
         if method == TRILINEAR:
-            lod = level_of_detail(
+            step = texel_step(
                 chains, texture, uv[1, 0] - uv[0, 0], uv[1, 1] - uv[0, 1], uv[2, 0] - uv[0, 0], uv[2, 1] - uv[0, 1]
             )
+            lod = level_of_detail(chains, texture, step)
     for k in range(4):
         x, y = np.float32(place[0] + k % 2) + _HALF, np.float32(place[1] + k // 2) + _HALF
         out[k] = _ONE if texture < 0 else _ZERO
@@ -99,7 +103,7 @@ def _shade_quad(
         for c in range(3):
             out[k, c] *= evaluate(planes[COLOR + c], x, y) * w * light
         out[k, 3] *= evaluate(planes[COLOR + 3], x, y) * w * opacity
-    return lod
+    return lod, step <= MAGNIFIED
 
 
 @kernel(error_model="numpy")
@@ -129,21 +133,23 @@ def shade_block(
     addresses = np.empty((8, 4 * QUADS_A_WARP), np.int64)
     for warp in range(first, min(first + BLOCK // 4, len(quads)), QUADS_A_WARP):
         addresses[:] = links[:] = -1
-        textured = 0
+        textured = magnified = 0
         end = min(warp + QUADS_A_WARP, len(quads))
         for q in range(warp, end):
             p = queue[quads[q]]
             texture = texture_ids[ids[p]]
             for k in range(4):
                 links[4 * (q - warp) + k] = 4 * (places[q, 0] + k % 2 + width * (places[q, 1] + k // 2))
-            lod = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
+            lod, large = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
             if row is not None and texture >= 0:
                 _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
                 textured += 4
+                magnified += large
         if row is not None:
             row[PixelShaderEvent.WARPS] += 1
             row[PixelShaderEvent.WARP_LANES] += 4 * (end - warp)
             row[PixelShaderEvent.TEXTURED_WARPS] += textured > 0
+            row[PixelShaderEvent.MAGNIFIED_WARPS] += magnified > 0
             lanes, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP, merge)
             row[PixelShaderEvent.ATOMIC] += 1
             row[PixelShaderEvent.ATOMIC_LANES] += lanes

@@ -192,8 +192,9 @@ def primitive_assembly(
     events[:, PrimitiveAssemblyEvent.STORE_TRANSACTIONS] = stores
     events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
     streams = (
-        Stream("vertices_out", "load", 3 * 64 * count, len(x) * VERTEX_BYTES),
-        Stream("primitives", "store", used * PRIMITIVE_BYTES, used * PRIMITIVE_BYTES),
+        Stream("indices", "load", 12 * count, 12 * count),
+        Stream("vertices_out", "load", 3 * VERTEX_BYTES * count, len(x) * VERTEX_BYTES),
+        Stream("primitives", "store", int(stores.sum()) * segment, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
     work = Work(

@@ -21,7 +21,6 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.zhang2025.primitive_assembly import PRIMITIVE_BYTES
 from tilestamp.simulator.stages.zhang2025.triangle_setup import launched_blocks
 from tilestamp.simulator.work import Work
 
@@ -173,7 +172,7 @@ def primitive_binning(
     _add_costs(events, counts, len(boxes), simt)
     total = events.sum(axis=0)
     streams = (
-        Stream("compacted", "load", 3 * 32 * len(boxes), len(boxes) * PRIMITIVE_BYTES),
+        Stream("compacted", "load", 3 * 32 * len(boxes), 3 * 32 * len(boxes)),
         Stream(
             "bin_queue",
             "store",

@@ -80,7 +80,7 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> Stage
         Stream(
             "primitives", "load", 32 * blocks * BLOCK + len(kept) * PRIMITIVE_BYTES, blocks * BLOCK * PRIMITIVE_BYTES
         ),
-        Stream("compacted", "store", len(kept) * PRIMITIVE_BYTES, len(kept) * PRIMITIVE_BYTES),
+        Stream("compacted", "store", int(words.sum()) * segment, len(kept) * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveCompaction"
     work = Work(
