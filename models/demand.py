@@ -168,7 +168,7 @@ def _l1_rates(l1: Any, machine: Any, moved: Traffic, totals: Any) -> None:
     l1[E.LOAD_BYTES] = 1.0 / machine[M.MEMORY_L1_BYTES_PER_CLOCK]
     l1[E.STORE_BYTES] = 1.0 / (machine[M.MEMORY_L1_WRITE_BYTES_PER_CLOCK] or machine[M.MEMORY_L1_BYTES_PER_CLOCK])
     l1[E.LOAD_BYTES] += lines * moved.read_lines / max(1.0, totals[E.LOAD_BYTES])
-    l1[E.STORE_BYTES] += lines * moved.written_lines / max(1.0, moved.written_bytes)
+    l1[E.STORE_BYTES] += lines * moved.written_lines / max(1.0, totals[E.STORE_BYTES])
 
 
 @kernel

@@ -32,6 +32,7 @@ from tilestamp.simulator.work import Work
 
 OVERDRAW = 4  # fragments a pixel that the stream has room for
 FRAGMENT_OUT_BYTES = 32
+LINES_IN, LINES_OUT = 12, 8  # of 128 bytes that a warp's records lie in
 AT_ONCE = 1 << 16  # bytes: what a warp stores again, or another one of the tile, it does at once
 FILTERS = {"nearest": NEAREST, "bilinear": BILINEAR, "trilinear": TRILINEAR}
 Filter = Literal["nearest", "bilinear", "trilinear"]
@@ -142,10 +143,21 @@ def pixel_shader(
         int(total[PixelShaderEvent.TEXTURE_BYTES]), len(chains.texels) * TEXEL_BYTES
     )  # neighbours reuse them at once
     streams = (
-        Stream("fragments", "load", 4 * count * FRAGMENT_BYTES, 4 * count * FRAGMENT_BYTES),
+        Stream(
+            "fragments",
+            "load",
+            4 * count * FRAGMENT_BYTES,
+            4 * count * FRAGMENT_BYTES,
+            partial_lines=LINES_IN * int(3 * total[PixelShaderEvent.WARPS] - total[PixelShaderEvent.TEXTURED_WARPS]),
+        ),
         Stream("texture", "load", texels, texels),
         Stream(
-            "fragments_out", "store", int(total[PixelShaderEvent.STORE_BYTES]), 4 * count * FRAGMENT_OUT_BYTES, AT_ONCE
+            "fragments_out",
+            "store",
+            int(total[PixelShaderEvent.STORE_BYTES]),
+            4 * count * FRAGMENT_OUT_BYTES,
+            AT_ONCE,
+            partial_lines=2 * LINES_OUT * int(total[PixelShaderEvent.WARPS]),
         ),
         Stream(
             "pixel_base",

@@ -121,15 +121,14 @@ def rop(
     _add_costs(events)
     total = events.sum(axis=0)
     pixels = width * height
+    lists, halves = int(total[RopEvent.LIST_LANES]), 2 * int(total[RopEvent.WARPS])  # of lines: 16 pixels of 4 bytes
     streams = (
-        Stream("pixel_base", "load", 4 * pixels, 4 * pixels),
-        Stream(
-            "fragments_out", "load", 32 * int(total[RopEvent.LIST_LANES]), 4 * len(stream.entries) * FRAGMENT_OUT_BYTES
-        ),
-        Stream("depth", "load", 4 * pixels, 4 * pixels),
+        Stream("pixel_base", "load", 4 * pixels, 4 * pixels, partial_lines=halves),
+        Stream("fragments_out", "load", 32 * lists, 4 * len(stream.entries) * FRAGMENT_OUT_BYTES, partial_lines=lists),
+        Stream("depth", "load", 4 * pixels, 4 * pixels, partial_lines=halves),
         Stream("target", "load", 16 * pixels, 16 * pixels),
-        Stream("target", "store", 16 * pixels, 16 * pixels),
-        Stream("depth", "store", 4 * pixels, 4 * pixels),
+        Stream("target", "store", 16 * pixels, 16 * pixels, partial_lines=0),
+        Stream("depth", "store", 4 * pixels, 4 * pixels, partial_lines=halves),
     )
     kernel, shared = ("ROP", 2 * 4 * KEPT * 256) if optimized else ("ROP_before", 0)
     work = Work(
