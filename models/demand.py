@@ -10,7 +10,8 @@ l1          the load/store path of its SM: bytes of its transactions, and the re
 
 and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, of a lone warp, and what that
 warp waits for others of its block on the same scheduler (half of what both want), with its own ``l1`` on top where the
-block's warps go in step; or its own instructions when its warps are too few for all schedulers. What all units together ask of the chip is ``models.bounds``'s.
+block's warps go in step; or its own instructions when its warps are too few for all schedulers. What all units together
+ask of the chip is ``models.bounds``'s.
 
 All but a few maxima are sums of machine events times cycles: ``rates`` makes the matrix, and ``demands`` sees of a
 machine nothing else, so that two machines with the same matrix have the same demands.

@@ -7,6 +7,7 @@ was fitted to the frames of one scene; the graph takes the machine file's step.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from tilestamp.experiments.harness.result import Result
@@ -75,7 +76,7 @@ def run(progress: Callable[[str], None]) -> Result:
 
 def _rows(measured: Measured, config: str) -> Iterator[dict[str, Any]]:
     """One frame: its kernels, what goes on between them, and the events of the sources on a CPU."""
-    drawn = draw(measured, textured=config == "stream_textured")
+    drawn = _drawn(measured.name, config == "stream_textured")
     kernels = [kernel_name(work, drawn) for work in drawn.frame.works if isinstance(work, Work)]
     if ("stream", "ROP", 0, "us_median") not in measured.on_gpu:  # the original stops there
         kernels = ["" if kernel == "ROP" else kernel for kernel in kernels]
@@ -92,6 +93,12 @@ def _rows(measured: Measured, config: str) -> Iterator[dict[str, Any]]:
             yield (
                 about | {"config": "counts", "kernel": kernel} | entry(metric, drawn.counts[event] / share, theirs, 0.0)
             )
+
+
+@cache
+def _drawn(name: str, textured: bool) -> Run:
+    """Draw once: where a fitted number is moved the same run is priced again."""
+    return draw(read_measured(name), textured=textured)
 
 
 def draw(measured: Measured, *, textured: bool) -> Run:
