@@ -115,7 +115,7 @@ def test_lines_that_are_moved_in_part_take_the_sm_their_own_cycles():
     what.events[1, E.LOAD_BYTES] = 300
     assert demand(what, MACHINE, Traffic(0, 400, 0, read_lines=8)).l1.tolist() == [100 / 32 + 2 * 5, 300 / 32 + 6 * 5]
     stored = Traffic(0, 64, 0, written_bytes=64, written_lines=4)
-    assert asked(stored, STORE_BYTES=32).l1 == 32 / 8 + 2 * 5
+    assert asked(stored, STORE_BYTES=32).l1 == 32 / 8 + 4 * 5
 
 
 def test_lines_that_are_moved_in_part_take_l2_more_than_their_bytes():
@@ -197,8 +197,8 @@ def test_dependent_steps_wait_one_after_another(events, cycles):
 def test_warps_in_step_wait_for_their_own_way_through_l1_too():
     """80 bytes stored at 8 a clock, after a chain of 2 loads and a block's start."""
     what = launch(units=1, block=128, CHAIN_LOAD=2, STORE_BYTES=80, STORE_TRANSACTIONS=3)
-    assert demand(what, MACHINE, 0.0).alone == 240
-    assert demand(replace(what, in_step=True), MACHINE, 0.0).alone == 250
+    assert demand(what, MACHINE, NOTHING).alone == 240
+    assert demand(replace(what, in_step=True), MACHINE, NOTHING).alone == 250
 
 
 def test_a_load_waits_for_dram_by_the_share_that_misses():
