@@ -110,7 +110,7 @@ def test_stores_take_the_load_path_at_their_own_rate():
 
 
 def test_lines_that_are_moved_in_part_take_the_sm_their_own_cycles():
-    """Loads by what each unit loads; stores by the lines a byte stored, however many bytes left L1."""
+    """Loads by what each unit loads, stores by what it stores."""
     what = launch(units=2, LOAD_BYTES=100)
     what.events[1, E.LOAD_BYTES] = 300
     assert demand(what, MACHINE, Traffic(0, 400, 0, read_lines=8)).l1.tolist() == [100 / 32 + 2 * 5, 300 / 32 + 6 * 5]
