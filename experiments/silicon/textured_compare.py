@@ -59,16 +59,11 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
         about = {"scene": measured.name, "config": drawn.config, "kernel": kernel, "instance": instance}
         timed = (drawn.config, kernel, instance, TIME_METRIC)
         if timed in measured.on_gpu:
-<<<<<<< HEAD
-            yield about | _entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
-        for config in (drawn.config, *drawn.counted_as):
-=======
             yield about | entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
-        for config in filter(None, (drawn.config, drawn.counted_as)):
->>>>>>> 16f154e (wip: clears, graph, experiment)
+        for config in (drawn.config, *drawn.counted_as):
             place = (config, kernel, instance)
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
-            yield from (about | entry for entry in _counters(launch, counters, drawn))
+            yield from (about | counted for counted in _counters(launch, counters, drawn))
     about = {"scene": measured.name, "config": drawn.config, "kernel": "frame", "instance": 0}
     whole = sum(time for time, kernel in zip(times, drawn.kernels, strict=True) if kernel)
     yield about | entry(FRAME_TIME, whole, measured.on_gpu[drawn.config, "frame", 0, FRAME_METRIC], None)
