@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter
+from tilestamp.models.error_model import Interval, error_interval
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
@@ -101,7 +102,7 @@ class Run:
     @priced_property
     def stages(self) -> "pd.DataFrame":
         """One row a stage, in the order of the pipeline: counts, rates, cycles, milliseconds, bound."""
-        table = stage_table(self.frame.works, self.launches, self.timings, self.machine.sm.warp_size)
+        table = stage_table(self.frame.works, self.launches, self.timings, self.machine)
         return table.join(interval_table(self.intervals)) if self.sampled else table
 
     @cached_property
@@ -124,6 +125,11 @@ class Run:
     def milliseconds(self) -> float:
         """The frame: its launches one after another."""
         return float(sum(timing.milliseconds for timing in self.timings))
+
+    @property
+    def error_interval(self) -> Interval:
+        """Milliseconds between which the frame lies on a real machine in 95 of 100 cases (``models.error_model``)."""
+        return error_interval(self.timings, self.machine)
 
     @priced_property
     def intervals(self) -> dict[tuple[str, str], Estimate]:

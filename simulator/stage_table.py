@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter, by_name, counters_of
+from tilestamp.models.error_model import error_interval
 from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
+from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
 from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work
@@ -21,15 +23,15 @@ def stage_table(
     works: Sequence[Work | FixedFunctionWork],
     launches: Sequence[Launch | PipeLaunch],
     timings: Sequence[Timing],
-    warp: int,
+    machine: Machine,
 ) -> "pd.DataFrame":
     """Gather launches by stage.
 
     Parameters
     ----------
     works, launches, timings : sequences of equal length, in launch order
-    warp : int
-        Lanes in a warp.
+    machine : Machine
+        On which they were priced.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def stage_table(
     stages = list(dict.fromkeys(work.stage for work in works))
     counters = declared(works)
     rows = [
-        _row([part for part in zip(works, launches, timings, strict=True) if part[0].stage == stage], warp, counters)
+        _row([part for part in zip(works, launches, timings, strict=True) if part[0].stage == stage], machine, counters)
         for stage in stages
     ]
     return pd.DataFrame(rows, index=pd.Index(stages, name="stage"))
@@ -68,35 +70,39 @@ def declared_columns(works: Sequence[Work | FixedFunctionWork], counters: Mappin
     return columns
 
 
-def _machine(machine: NDArray[np.float64]) -> dict[str, float]:
+def _machine(events: NDArray[np.float64]) -> dict[str, float]:
     """Columns of what the machine's events declare, for one stage."""
-    counts = {event.name: round(float(machine[event])) for event in MachineEvent}
+    counts = {event.name: round(float(events[event])) for event in MachineEvent}
     return {name: value for c in counters_of(MachineEvent) for name, value in c.values(counts, []).items()}
 
 
-def _row(parts: list[tuple[Any, Any, Timing]], warp: int, counters: Mapping[str, Counter]) -> dict[str, Any]:
+def _row(parts: list[tuple[Any, Any, Timing]], machine: Machine, counters: Mapping[str, Counter]) -> dict[str, Any]:
     """One stage: sums over its launches; occupancy and bound of its longest."""
     longest = max(parts, key=lambda part: part[2].milliseconds)[2]
     simt = [(work, launch) for work, launch, _ in parts if isinstance(launch, Launch)]
-    machine = sum((launch.events.sum(axis=0) for _, launch in simt), np.zeros(len(MachineEvent)))
-    instructions = float(sum(machine[event] for event in INSTRUCTION_CLASSES))
+    events = sum((launch.events.sum(axis=0) for _, launch in simt), np.zeros(len(MachineEvent)))
+    warp, timings = machine.sm.warp_size, [timing for _, _, timing in parts]
+    error = error_interval(timings, machine)
+    instructions = float(sum(events[event] for event in INSTRUCTION_CLASSES))
     return {
         "blocks": sum(launch.grid for _, launch in simt),
         "warps": sum(launch.grid * -(-launch.block // warp) for _, launch in simt),
         "instructions": round(instructions),
-        "simd_efficiency": machine[MachineEvent.LANES] / (warp * instructions) if instructions else np.nan,
+        "simd_efficiency": events[MachineEvent.LANES] / (warp * instructions) if instructions else np.nan,
         **declared_columns([work for work, _, _ in parts], counters),
-        **_machine(machine),
-        "dram_bytes": sum(round(timing.dram_bytes) for _, _, timing in parts),
+        **_machine(events),
+        "dram_bytes": sum(round(timing.dram_bytes) for timing in timings),
         "occupancy": longest.occupancy,
         "achieved_occupancy": longest.achieved,
         "residency": longest.residency,
-        "cycles": sum(timing.cycles for _, _, timing in parts),
-        "milliseconds": sum(timing.milliseconds for _, _, timing in parts),
-        "low_milliseconds": sum(timing.low for _, _, timing in parts),
-        "high_milliseconds": sum(timing.high for _, _, timing in parts),
+        "cycles": sum(timing.cycles for timing in timings),
+        "milliseconds": sum(timing.milliseconds for timing in timings),
+        "low_milliseconds": sum(timing.low for timing in timings),
+        "high_milliseconds": sum(timing.high for timing in timings),
+        "error_low_milliseconds": error.low,
+        "error_high_milliseconds": error.high,
         "bound": longest.bound,
-        **_terms([timing for _, _, timing in parts]),
+        **_terms(timings),
     }
 
 

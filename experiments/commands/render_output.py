@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.experiments.commands.terminal import print_table, writing
+from tilestamp.models.error_model import was_measured
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 
@@ -70,6 +71,7 @@ def as_json(run: Run) -> dict[str, Any]:
         "fidelity": run.fidelity,
         "options": run.options,
         "milliseconds": run.milliseconds if run.counted else None,
+        "error_interval_milliseconds": _plain(run.error_interval) if run.counted else None,
         **_sampling(run),
         "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
         "counters": {name: {"title": c.title, "kind": c.kind} for name, c in run.counters.items()},
@@ -114,7 +116,13 @@ def print_run(run: Run, output: Path | None, map_: str | None = None) -> None:
         print_table(f"{title}: {_shown_time(run)}", ["stage", *columns], rows)
     else:
         sys.stdout.write(f"{title}: nothing was counted, so there is no time\n")
-    lines = [run.note, *run.frame.remarks, _shown_sample(run), f"picture: {output}" if output else ""]
+    lines = [
+        _shown_error(run),
+        run.note,
+        *run.frame.remarks,
+        _shown_sample(run),
+        f"picture: {output}" if output else "",
+    ]
     lines += [f"map of {map_}: {map_path(output, map_)}"] if output and map_ else []
     sys.stdout.writelines(f"{line}\n" for line in lines if line)
 
@@ -124,6 +132,19 @@ def _shown_time(run: Run) -> str:
     if not run.sampled:
         return f"{run.milliseconds:.2f} ms"
     return f"{run.milliseconds:.2f} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
+
+
+def _shown_error(run: Run) -> str:
+    """Say how far the frame's time may be from a real machine's."""
+    if not run.counted or run.milliseconds != run.milliseconds:
+        return ""
+    low, high = run.error_interval
+    there = (
+        f"kernel times measured on {run.machine.name}"
+        if was_measured(run.machine)
+        else "published times of other machines"
+    )
+    return f"expect {low:.4g} to {high:.4g} ms: so near were 95 % of the {there}"
 
 
 def _shown_sample(run: Run) -> str:

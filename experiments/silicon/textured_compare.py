@@ -10,6 +10,7 @@ from tilestamp.experiments.silicon.textured_inputs import FRAME_METRIC, TIME_MET
 from tilestamp.experiments.validation.quantities import MOVED, MOVED_AIM, QUANTITIES, SHORTEST_US, TIME, TIME_AIM
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.price import price
+from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import traffic
 from tilestamp.simulator.run import Run
 
@@ -41,31 +42,31 @@ class Drawn:
     counted_as: tuple[str, ...] = ()
 
     @property
-    def microseconds(self) -> list[float]:
+    def timings(self) -> list[Timing]:
         """Time of each launch in a frame that follows another one, as they were measured."""
         launches = self.run.launches
-        return [
-            1e3 * timing.milliseconds for timing in price([*launches, *launches], self.run.machine)[len(launches) :]
-        ]
+        return price([*launches, *launches], self.run.machine)[len(launches) :]
 
 
 def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
     """Ours beside what was measured of each launch: time, and counters where it was profiled."""
     seen: Counter[str] = Counter()
-    times = drawn.microseconds
-    for kernel, launch, ours in zip(drawn.kernels, drawn.run.launches, times, strict=True):
+    timings = drawn.timings
+    for kernel, launch, ours in zip(drawn.kernels, drawn.run.launches, timings, strict=True):
         instance = seen[kernel]
         seen[kernel] += 1
         about = {"scene": measured.name, "config": drawn.config, "kernel": kernel, "instance": instance}
         timed = (drawn.config, kernel, instance, TIME_METRIC)
         if timed in measured.on_gpu:
-            yield about | entry(TIME, ours, measured.on_gpu[timed], TIME_AIM)
+            yield (
+                about | {"bound": ours.bound} | entry(TIME, 1e3 * ours.milliseconds, measured.on_gpu[timed], TIME_AIM)
+            )
         for config in (drawn.config, *drawn.counted_as):
             place = (config, kernel, instance)
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
             yield from (about | counted for counted in _counters(launch, counters, drawn))
     about = {"scene": measured.name, "config": drawn.config, "kernel": "frame", "instance": 0}
-    whole = sum(time for time, kernel in zip(times, drawn.kernels, strict=True) if kernel)
+    whole = 1e3 * sum(each.milliseconds for each, kernel in zip(timings, drawn.kernels, strict=True) if kernel)
     yield about | entry(FRAME_TIME, whole, measured.on_gpu[drawn.config, "frame", 0, FRAME_METRIC], None)
 
 

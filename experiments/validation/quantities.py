@@ -8,6 +8,7 @@ from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
 from tilestamp.models.price import price
+from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import Traffic
 
 SHORTEST_US = 5.0  # kernels below are measured, and not judged
@@ -120,6 +121,11 @@ TIME_METRIC = "cupti_us_median"
 TIME_AIM = 0.40  # of one kernel; 0.12 on average
 
 
-def warm_microseconds(launch: Launch, machine: Machine) -> float:
+def warm(launch: Launch, machine: Machine) -> Timing:
     """Time of a launch that runs again and again, as the measured ones did: its buffers are in the cache."""
-    return price([launch, launch], machine)[1].milliseconds * 1e3
+    return price([launch, launch], machine)[1]
+
+
+def warm_microseconds(launch: Launch, machine: Machine) -> float:
+    """``warm`` in microseconds."""
+    return warm(launch, machine).milliseconds * 1e3

@@ -17,12 +17,13 @@ from tilestamp.experiments.validation.quantities import (
     TIME_METRIC,
     WALL,
     WALL_AIM,
-    warm_microseconds,
+    warm,
 )
 from tilestamp.models.errors import MissingInputError, TilestampError
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import Machine
 from tilestamp.models.remembered import priced_property
+from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import traffic
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
@@ -72,9 +73,9 @@ class Execution:
         return mix.launch(self.work, self.machine.sm.warp_size)
 
     @priced_property
-    def microseconds(self) -> float:
+    def timing(self) -> Timing:
         """Its time, where its buffers are in the cache."""
-        return warm_microseconds(self.launch, self.machine)
+        return warm(self.launch, self.machine)
 
 
 def executions(
@@ -131,8 +132,8 @@ def compare(folder: Path, executed: Iterable[Execution]) -> "pd.DataFrame":
     Returns
     -------
     DataFrame
-        Columns scene, W, tile, spp, kernel, quantity, ours, measured, error, aim; an error is relative, absolute for
-        SIMD efficiency.
+        Columns scene, W, tile, spp, kernel, quantity, ours, measured, error, aim, and of times bound; an error is
+        relative, absolute for SIMD efficiency.
 
     Raises
     ------
@@ -272,8 +273,8 @@ def _rows(measured: dict[tuple[Any, ...], float], execution: Execution) -> Itera
             ours = moved.ours(launch, cold)
             yield about | _entry(moved.name, ours, theirs, ours / theirs - 1.0, MOVED_AIM)
     if (*key, TIME_METRIC) in measured:
-        theirs, ours = measured[(*key, TIME_METRIC)], execution.microseconds
-        yield about | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
+        theirs, ours = measured[(*key, TIME_METRIC)], 1e3 * execution.timing.milliseconds
+        yield about | {"bound": execution.timing.bound} | _entry(TIME, ours, theirs, ours / theirs - 1.0, TIME_AIM)
     seconds = execution.seconds + time.perf_counter() - begun
     yield about | _entry(WALL, seconds, WALL_AIM, 0.0, None)
 
