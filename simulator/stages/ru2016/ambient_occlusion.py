@@ -2,27 +2,35 @@
 
 Samples of the upper hemisphere are turned about its axis by the noise of the pixel, lifted to the eye-space normal,
 and projected; a sample is occluded if the pixel there is before it. "Need to use linear depth." A second kernel blurs
-(``occlusion_blur``). The cost is that of the screen, whatever the scene. The sample pattern, the radius and
+(``occlusion_blur``). Instructions are those of the screen, whatever the scene; memory is read where something is drawn:
+a sample's fragment lies in a sector of its own. The sample pattern, the radius and
 the range check are ours: he names none.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
-from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK
+from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, by_warp
 from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
 from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, EyeSpace, Samples
-from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.stages.thread_per_item import Access, ThreadEvent, thread_per_item
+from tilestamp.simulator.work import Work
 
 SAMPLES = 64
+SAMPLED = 100  # sectors that a drawn pixel reads besides: 64 samples and what they are compared with (H200: 94 to 112)
+RECORD_BYTES = 64  # fragment with its occlusion
+FRAGMENT_WORDS = 7
 NOISE = 4  # pixels on a side of the noise texture
 RADIUS = 0.05  # of the distance from the eye
 BIAS = np.float32(0.02)  # of the radius: a surface does not occlude itself
@@ -134,8 +142,22 @@ def ambient_occlusion(
         _ambient_occlusion, parts_of(len(light)), fragments.w, fragments.normals, noise(), hemisphere(), eye.scales,
         SHIFTS[samples], np.float32(RADIUS), light,
     )  # fmt: skip
-    loads = (Access("fragments", 64, 7), Access("linear_depth", 4, SAMPLES))
-    stores = (Access("occlusion", 4, 1),)
-    occlusion = thread_per_item("ambient_occlusion", "ambient_occlusion", light.size, BLOCK, simt, loads, stores)
+    occlusion = _work(fragments.w > _ZERO, simt)
     light, blur, _ = occlusion_blur(light, simt)
     return StageResult(light, (occlusion, *blur))
+
+
+def _work(drawn: NDArray[np.bool_], simt: Simt) -> Work:
+    """A thread a pixel; the samples' directions are the same words for all lanes."""
+    loads, stores = (Access("fragments", RECORD_BYTES, FRAGMENT_WORDS),), (Access("occlusion", RECORD_BYTES, 1),)
+    by_block = by_warp(drawn).reshape(-1, BLOCK).sum(axis=1)
+    idle = len(by_block) - -(-drawn.size // BLOCK)  # blocks of 8x8 that the picture's edges cut
+    work = thread_per_item("ambient_occlusion", "ambient_occlusion", drawn.size, BLOCK, simt, loads, stores, idle)
+    segment = smallest_transaction_bytes(int(simt.coalescing))
+    sampled = SAMPLED * by_block
+    read = 3 * SAMPLES * work.table[:, ThreadEvent.WARPS] + sampled
+    work.table[:, ThreadEvent.LOAD_TRANSACTIONS] += read
+    work.table[:, ThreadEvent.LOAD_BYTES] += segment * read
+    total = segment * int(sampled.sum())
+    fetched = Stream("fragments", "load", total, min(total, RECORD_BYTES * drawn.size), partial_lines=total // segment)
+    return replace(work, streams=(*work.streams, fetched))

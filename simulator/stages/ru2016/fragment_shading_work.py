@@ -64,7 +64,7 @@ def shading_work(
     simt : Simt
     """
     event = FragmentShadingEvent
-    shaded, textured = _by_warp(drawn), _by_warp(textures >= 0)
+    shaded, textured = by_warp(drawn), by_warp(textures >= 0)
     table = np.zeros((len(shaded) // 2, len(event)), np.int64)
     table[:, event.BLOCKS] = 1
     table[:, event.WARPS] = BLOCK // simt.warp
@@ -109,7 +109,7 @@ def shading_work(
     )
 
 
-def _by_warp(pixels: NDArray[Any]) -> NDArray[Any]:
+def by_warp(pixels: NDArray[Any]) -> NDArray[Any]:
     """Pixels as warps of 8x4, two a block of 8x8, (warps, 32); 0 beyond the picture."""
     rows, columns = -(-pixels.shape[0] // SIDE), -(-pixels.shape[1] // SIDE)
     padded = np.zeros((rows * SIDE, columns * SIDE), pixels.dtype)
@@ -132,7 +132,7 @@ def _zeros(textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: Textur
     zero = np.zeros((*textures.shape, TEXEL_BYTES), np.bool_)
     if mapped.any():
         zero[mapped] = chains.texels[_texels(textures[mapped], uvs[mapped], chains), :TEXEL_BYTES] == 0.0
-    lanes = np.stack([_by_warp(zero[:, :, c]).sum(axis=1) for c in range(TEXEL_BYTES)], axis=1)
+    lanes = np.stack([by_warp(zero[:, :, c]).sum(axis=1) for c in range(TEXEL_BYTES)], axis=1)
     return np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1)], axis=1)
 
 
@@ -145,6 +145,6 @@ def _texel_lines(
     if mapped.any():
         first = _texels(textures[mapped], uvs[mapped], chains) * TEXEL_BYTES
         line[mapped] = 1 + first // LINE_BYTES
-    warps = np.sort(_by_warp(line), axis=1)
+    warps = np.sort(by_warp(line), axis=1)
     new = np.diff(warps, axis=1, prepend=0) != 0
     return new.sum(axis=1), len(np.unique(line[mapped]))

@@ -31,6 +31,7 @@ from tilestamp.simulator.work import Work
 FRAGMENT_BYTES = 56  # eye position, eye normal, texture coordinate, texture pointer and size, whether to shade
 TEST_LOADS = 7  # the entry, and x and y of three vertices
 HIT_LOADS = 6  # z and w of three vertices
+LINE_BYTES = 128
 FAR = np.float32(1.0)
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
@@ -197,6 +198,7 @@ def tiled_raster(
             width * height * (len(words(simt).fragment) * SECTOR_BYTES + 4),
             width * height * (FRAGMENT_BYTES + 4),
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
+            partial_lines=_lines(simt, tile) * int(events[:, TiledRasterEvent.WARPS].sum()),
         ),
     )
     return StageResult(visible, (raster_work(events, tile, streams),))
@@ -224,8 +226,7 @@ def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
         + events[:, TiledRasterEvent.HIT_WARPS] * HIT_LOADS
         + events[:, TiledRasterEvent.NEARER_WARPS] * words(simt).nearer
     )
-    lanes = np.where(np.arange(simt.warp) < tile * tile, np.arange(simt.warp), -1)
-    addresses = np.where(lanes >= 0, (lanes // tile * 800 + lanes % tile) * FRAGMENT_BYTES, -1)
+    addresses = _fragments(simt, tile)
     rule = int(simt.coalescing)
     stores = [transactions(addresses, simt.warp, bytes_, rule) for bytes_ in words(simt).fragment]
     stores.append(transactions(addresses // FRAGMENT_BYTES * 4, simt.warp, 4, rule))
@@ -235,3 +236,17 @@ def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:
     events[:, TiledRasterEvent.LOAD_BYTES] = reads * segment
     events[:, TiledRasterEvent.STORE_TRANSACTIONS] = writes * count
     events[:, TiledRasterEvent.STORE_BYTES] = writes * size
+
+
+def _fragments(simt: Simt, tile: int) -> NDArray[np.int64]:
+    """Address of each lane's fragment; -1 for lanes that a small tile leaves idle."""
+    lanes = np.arange(simt.warp)
+    return np.where(lanes < tile * tile, (lanes // tile * 800 + lanes % tile) * FRAGMENT_BYTES, -1)
+
+
+def _lines(simt: Simt, tile: int) -> int:
+    """Lines of 128 bytes that the stores of a warp's fragments touch, each in part."""
+    addresses = _fragments(simt, tile)
+    addresses = addresses[addresses >= 0]
+    places = np.cumsum((0, *words(simt).fragment))[:-1]
+    return sum(len(np.unique((addresses + place) // LINE_BYTES)) for place in places)

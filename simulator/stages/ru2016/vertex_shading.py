@@ -13,16 +13,17 @@ The pipeline is given one model-to-clip matrix; its rows give the eye's axes, si
 row 0 is the right axis, row 1 the up axis and row 3 the forward axis, each times a factor.
 """
 
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
-from tilestamp.models.simt import Simt
+from tilestamp.models.simt import Coalescing, Simt
 from tilestamp.simulator.scenes.textured_mesh import Geometry
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.stages.thread_per_item import Access, ThreadEvent, record_transactions, thread_per_item
 from tilestamp.simulator.work import Work
 
 BLOCK = 128  # threads
@@ -154,7 +155,9 @@ def _shading_work(count: int, part: int, textured: bool, simt: Simt) -> Work:
         loads.append(Access(f"uvs {part}", 8, 2))
     stored = PLAIN_STORES + (TEXTURE_STORES if textured else 0)
     stores = (Access(f"vertices {part}", VERTEX_BYTES, stored),)
-    return thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, tuple(loads), stores)
+    return _word_by_word(
+        thread_per_item("vertex_shading", "vertex_shading", count, BLOCK, simt, tuple(loads), stores), simt
+    )
 
 
 def primitive_assembly(
@@ -170,7 +173,11 @@ def primitive_assembly(
     """
     before = (vertices.screen[:, 3] > 0.0)[mesh.triangles].all(axis=1)
     sizes = [len(mesh.triangles)] if parts is None else parts[:, 1].tolist()
-    works = tuple(_assembly_work(3 * size, i, simt) for i, size in enumerate(sizes))
+    ends = np.cumsum(sizes)
+    works = tuple(
+        _assembly_work(mesh.triangles[end - size : end].ravel(), i, simt)
+        for i, (size, end) in enumerate(zip(sizes, ends, strict=True))
+    )
     return StageResult(np.flatnonzero(before).astype(np.int32), works)
 
 
@@ -192,8 +199,33 @@ def shaded_primitives(
     )
 
 
-def _assembly_work(indices: int, part: int, simt: Simt) -> Work:
+def _assembly_work(indices: NDArray[np.int32], part: int, simt: Simt) -> Work:
+    """A thread an index; lanes that copy the same vertex read the same sectors."""
     vertices = Access(f"vertices {part}", VERTEX_BYTES, VERTEX_WORDS)
     loads = (Access(f"indices {part}", INDEX_BYTES, 1), vertices)
     stores = (Access("primitives", PRIMITIVE_BYTES // 3, VERTEX_WORDS),)
-    return thread_per_item("primitive_assembly", "primitive_assembly", indices, BLOCK, simt, loads, stores)
+    work = thread_per_item("primitive_assembly", "primitive_assembly", len(indices), BLOCK, simt, loads, stores)
+    count, size = record_transactions(vertices, simt)
+    if len(indices):
+        again = (simt.warp - _distinct(indices, simt.warp)).reshape(len(work.table), -1).sum(axis=1)
+        work.table[:, ThreadEvent.LOAD_TRANSACTIONS] -= again * count // simt.warp
+        work.table[:, ThreadEvent.LOAD_BYTES] -= again * size // simt.warp
+    return _word_by_word(work, simt)
+
+
+def _word_by_word(work: Work, simt: Simt) -> Work:
+    """Let each store of a record's words leave L1 as a sector of its own, as an H200's counters have it."""
+    if simt.coalescing != Coalescing.WARP_SECTORS:
+        return work
+    stored = work.total(ThreadEvent.STORE_BYTES)
+    streams = (replace(s, bytes=stored) if s.op == "store" else s for s in work.streams)
+    return replace(work, streams=tuple(streams))
+
+
+def _distinct(indices: NDArray[np.int32], warp: int) -> NDArray[np.int64]:
+    """Vertices that each warp reads, of all warps of all blocks; lanes and warps without an index count as another."""
+    padded = -1 - np.arange(-(-len(indices) // BLOCK) * BLOCK)
+    padded[: len(indices)] = indices
+    ordered = np.sort(padded.reshape(-1, warp), axis=1)
+    found: NDArray[np.int64] = 1 + (np.diff(ordered, axis=1) != 0).sum(axis=1)
+    return found
