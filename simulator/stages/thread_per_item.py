@@ -25,9 +25,6 @@ class ThreadEvent(IntEnum):
     IDLE_WARPS = 7  # that find no item and return
 
 
-GATHERED = 64  # bytes from one record to the next up to which L1 gathers stores (H200: 36 does, 112 and 140 do not)
-
-
 class Access(NamedTuple):
     """How the items of a kernel touch one buffer.
 
@@ -40,12 +37,15 @@ class Access(NamedTuple):
         Memory instructions that read or write the record.
     word_bytes : int
         Bytes of each: 4, 8 or 16.
+    scattered : bool
+        Whether the segment of each word leaves L1 by itself, as stores to records that lie far apart do.
     """
 
     buffer: str
     stride: int
     words: int
     word_bytes: int = 4
+    scattered: bool = False
 
 
 def thread_per_item(
@@ -62,7 +62,6 @@ def thread_per_item(
     """Make the work table of a kernel whose thread i handles item i.
 
     The streams hold each record once: further words of a segment that a warp has just touched come from its L1 or L2.
-    Stores to records that lie far apart leave L1 by themselves, each word's segment.
 
     Parameters
     ----------
@@ -100,7 +99,7 @@ def thread_per_item(
             table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
             footprint = items * access.stride
             moved = int(warps.sum()) * size
-            if op == "load" or access.stride <= GATHERED:
+            if not access.scattered:
                 moved = min(moved, max(footprint, items * access.words * access.word_bytes))
             lines = partial_lines(access, simt.warp) if op == "store" else 0
             streams.append(Stream(access.buffer, op, moved, footprint, partial_lines=lines * int(warps.sum())))

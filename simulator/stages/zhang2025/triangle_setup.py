@@ -109,7 +109,7 @@ def triangle_setup(primitives: Primitives, simt: Simt, *, triangles: int = 0) ->
     )
     for_parts(_triangle_setup, parts_of(count, SMALLEST_PART), primitives.screen, primitives.varyings, *data[:3])
     loads = (Access("compacted", PRIMITIVE_BYTES, PRIMITIVE_BYTES // 4),)
-    stores = (Access("setup", SETUP_BYTES, SETUP_BYTES // 4),)
+    stores = (Access("setup", SETUP_BYTES, SETUP_BYTES // 4, scattered=True),)
     idle = max(0, launched_blocks(triangles) - max(1, -(-count // BLOCK)))
     stage = "TriangleSetup"
     work = thread_per_item(stage, stage, count, BLOCK, simt, loads, stores, idle_blocks=idle)
