@@ -140,7 +140,7 @@ def across_polygons(polygons, width, height, offsets, packing, simt):
                         tally["POLYGONS"] += 1
                         lanes[i] = list(waiting.pop(0))
             now = [lane.pop(0) for lane in lanes if lane]
-            _test(tally, now, width, spp, simt)
+            one_test(tally, now, width, spp, simt)
     return tally
 
 
@@ -150,7 +150,7 @@ def polygon_loads(first, count, corners, simt):
     return Counter(LOAD_TRANSACTIONS=number, LOAD_BYTES=moved)
 
 
-def _test(tally, tests, width, spp, simt):
+def one_test(tally, tests, width, spp, simt):
     """One warp execution of the sample test, and of depth and atomic where a lane hits."""
     if tests:
         tally += Counter(TEST_WARPS=1, SAMPLE_TESTS=len(tests))

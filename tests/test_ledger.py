@@ -43,7 +43,7 @@ def test_every_event_of_a_pipeline_occurs_in_the_ledger(pipeline):
 
 def test_every_stage_is_run_in_the_ledger():
     run = {kind for pipeline in pipeline_names() for kind in frames.event_kinds(pipeline)}
-    assert _event_kinds() - run == {"MotionEvent"}  # of experiments alone: see test_motion.py
+    assert _event_kinds() - run == set()
 
 
 def _event_kinds() -> set[str]:

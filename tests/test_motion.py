@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from tests import naive_ste
+from tests import naive_motion, naive_ste
+from tests.test_counts_of_warps import HOPPER, by_machine, nonzero
 from tests.test_stamps import HEIGHT, WIDTH, soup
+from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.pipelines._motion import MotionInput, eye_distances, moving_micropolygons
+from tilestamp.simulator.scenes import load_scene, read_camera
+from tilestamp.simulator.scenes.camera import fit_camera
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import BACKGROUND
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, project
 from tilestamp.simulator.stages.fatahalian2009.motion import (
     MotionEvent,
     blur_samples,
@@ -21,9 +27,9 @@ from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_bru
 PATTERNS = {"stratified": stratified_pattern(4, tile=3), "interleaved": interleaved_pattern(2, tile=2)}
 
 
-def draw(algorithm, polygons, pattern):
+def draw(algorithm, polygons, pattern, simt=HOPPER, *more):
     samples = blur_samples(WIDTH, HEIGHT, pattern)
-    return samples, algorithm(polygons, pattern, samples).works[0]
+    return samples, algorithm(polygons, pattern, samples, simt, *more).works[0]
 
 
 def blurred(count=10, way=(4.0, -2.0), seed=3):
@@ -36,19 +42,45 @@ def blurred(count=10, way=(4.0, -2.0), seed=3):
 def test_brute_force_is_python_at_every_sample(name):
     pattern, moving = PATTERNS[name], blurred(6)
     samples, _ = draw(motion_brute_force, moving, pattern)
-    tile = len(pattern.place)
     for y, x, s in np.ndindex(HEIGHT, WIDTH, pattern.place.shape[2]):
-        t, u, v = pattern.time_lens[y % tile, x % tile, s]
-        dx, dy = (int(d) for d in pattern.place[y % tile, x % tile, s])
         shown, nearest = -1, np.inf
         for p in range(6):
-            placed = moving.start[p].astype(float) + t * (moving.end[p] - moving.start[p])
-            placed = placed.astype(np.float32)
-            placed[:, :2] += moving.blur[p][:, None] * np.array([u, v])
-            depth = naive_ste.cover(placed.tolist(), x * naive_ste.SUB + dx, y * naive_ste.SUB + dy)
+            depth = naive_motion.depth(moving, pattern, p, x, y, s)
             if depth is not None and np.float32(depth) < nearest:
                 shown, nearest = p, np.float32(depth)
         assert samples.polygon.reshape(HEIGHT, WIDTH, -1)[y, x, s] == shown
+
+
+@pytest.mark.parametrize("intervals", [1, 2, 3])
+def test_samples_that_share_an_interval_are_drawn_as_by_brute_force(intervals):
+    moving, pattern = blurred(40), PATTERNS["stratified"]
+    brute, shared = draw(motion_brute_force, moving, pattern), draw(motion_interval, moving, pattern, HOPPER, intervals)
+    assert (brute[0].polygon == shared[0].polygon).all()
+    assert shared[1].total(MotionEvent.BOXES) == intervals * 40
+
+
+@by_machine
+@pytest.mark.parametrize("intervals", [4, 3])
+def test_every_event_of_intervals_is_that_of_python(simt, intervals):
+    moving, pattern = twice(blurred(20)), PATTERNS["stratified"]
+    _, work = draw(motion_interval, moving, pattern, simt, intervals)
+    expected = naive_motion.interval(moving, pattern, WIDTH, HEIGHT, intervals, simt)
+    assert expected["ATOMIC_CONFLICTS"] > 0
+    assert nonzero(work.counts()) == nonzero(expected)
+
+
+@by_machine
+def test_every_event_of_interleaving_is_that_of_python(simt):
+    moving, pattern = twice(blurred(20)), PATTERNS["interleaved"]
+    _, work = draw(motion_interleaved, moving, pattern, simt)
+    expected = naive_motion.interleaved(moving, pattern, WIDTH, HEIGHT, simt)
+    assert expected["ATOMIC_CONFLICTS"] > 0
+    assert nonzero(work.counts()) == nonzero(expected)
+
+
+def twice(moving):
+    """Each polygon two times, one after the other: lanes that want the same samples."""
+    return type(moving)(*(part.repeat(2, axis=0) for part in moving))
 
 
 @pytest.mark.parametrize("name", PATTERNS)
@@ -82,7 +114,7 @@ def test_interval_tests_grow_with_motion_and_interleaved_set_ups_do_not():
     interval = [draw(motion_interval, one_square((w, w / 2), 3.2), PATTERNS["stratified"])[1] for w in (0, 8)]
     interleaved = [draw(motion_interleaved, one_square((w, w / 2), 3.2), PATTERNS["interleaved"])[1] for w in (0, 8)]
     assert interval[1].total(MotionEvent.SAMPLE_TESTS) > 1.5 * interval[0].total(MotionEvent.SAMPLE_TESTS)
-    assert [w.total(MotionEvent.SETUPS) for w in interleaved] == [8, 8]
+    assert [w.total(MotionEvent.BOXES) for w in interleaved] == [8, 8]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +126,7 @@ def test_coverage_converges_to_the_blurred_area(make, algorithm):
     for spp in (2, 64):
         pattern = make(spp)
         samples = blur_samples(WIDTH, HEIGHT, pattern)
-        algorithm(one_square((4.0, 0.0)), pattern, samples)
+        algorithm(one_square((4.0, 0.0)), pattern, samples, HOPPER)
         cover = (samples.polygon.reshape(HEIGHT, WIDTH, spp) >= 0).mean(axis=2)
         errors.append(np.abs(cover[3, 3:8] - [0.125, 0.25, 0.25, 0.25, 0.125]).max())
     assert errors[1] < 0.08
@@ -125,3 +157,45 @@ def test_what_is_in_focus_has_no_circle_of_confusion():
 def test_no_samples_are_refused(make):
     with pytest.raises(TilestampError):
         make(0)
+
+
+@pytest.mark.parametrize("pipeline", ["interval", "interleaved"])
+@pytest.mark.parametrize("direction", [0.0, 90.0])
+def test_the_scene_moves_in_its_direction(pipeline, direction):
+    still, moving = (extent(pipeline, motion=motion, direction=direction) for motion in (0.0, 12.0))
+    left, top, right, low = moving - still
+    assert abs(left) <= 1
+    assert abs(low) <= 1
+    assert (right >= 9, -top >= 9) == (direction == 0.0, direction == 90.0)
+
+
+def extent(pipeline, **options):
+    """First column and row, last column and row that anything is drawn in."""
+    image = simulate("teapot", pipeline, width=96, height=72, fidelity="counts", lens=0.0, **options).image
+    rows, columns = np.nonzero((image < BACKGROUND).any(axis=2))
+    return np.array([columns.min(), rows.min(), columns.max(), rows.max()])
+
+
+def test_what_lies_at_the_focus_is_sharp_and_the_rest_by_its_distance():
+    scene = load_scene("teapot")
+    matrix = read_camera("default", scene).matrix(96, 72)
+    focus = float(eye_distances(moving_micropolygons(scene, matrix, 96, 72, MotionInput())[0], matrix, 96, 72)[5, 1])
+    still, moving = moving_micropolygons(scene, matrix, 96, 72, MotionInput(lens=6.0, focus=focus))
+    distance = eye_distances(still, matrix, 96, 72)
+    assert moving.blur[5, 1] == 0
+    assert moving.blur == pytest.approx(6.0 * np.abs(1 - focus / distance), abs=1e-5)
+
+
+def test_distances_are_those_of_the_camera():
+    camera = fit_camera([[-1, -1, -1], [1, 1, 1]])
+    look, matrix = camera.look_at(64, 48), camera.matrix(64, 48)
+    points = np.random.default_rng(5).random((7, 3)) * 2 - 1
+    screen, _ = project(np.concatenate([points, np.ones((7, 1))], axis=1), matrix, 64, 48)
+    polygons = Micropolygons(screen[:, None].astype(np.float32), np.zeros(7, np.int32), np.zeros(7, np.uint8))
+    ahead = (np.array(look.target) - look.eye) / np.linalg.norm(np.array(look.target) - look.eye)
+    assert eye_distances(polygons, matrix, 64, 48)[:, 0] == pytest.approx((points - look.eye) @ ahead, rel=1e-5)
+
+
+def test_more_intervals_than_samples_are_refused():
+    with pytest.raises(TilestampError, match="intervals is at most spp: 5 of 4 samples"):
+        simulate("teapot", "interval", width=8, height=8, intervals=5)

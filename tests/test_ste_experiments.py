@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eisenacher
+from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eisenacher, lockstep
 from tilestamp.experiments.ste.setting import cube, mean_area, random_polygons, student
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_options
 from tilestamp.simulator.scenes import load_scene, read_camera
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 
 
 @pytest.mark.parametrize(
@@ -102,3 +103,13 @@ def test_the_plain_mask_says_how_many_pixels_are_wrong():
 @pytest.mark.parametrize("name", ["stamps", "across-polygons", "bit-mask"])
 def test_every_pipeline_takes_samples_from_a_file(name):
     assert {"spp", "positions", "edge"} <= set(options_type(name).__struct_fields__)
+
+
+def test_a_lane_of_lockstep_waits_for_the_longest_and_repacking_fills_it():
+    one, many = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]]), np.float32([[0, 0], [8, 0], [8, 8], [0, 8]])
+    corners = np.stack([many + 0.25 if k % 4 == 0 else one * 0.5 + 0.25 for k in range(256)])
+    vertices = np.concatenate([corners, np.zeros((256, 4, 1), np.float32)], axis=2)
+    polygons = Micropolygons(vertices, np.zeros(256, np.int32), np.zeros(256, np.uint8))
+    waiting = lockstep.utilisation(polygons, "in-order", 4, 16, 16)
+    assert waiting == pytest.approx(100 * (81 + 3) / (4 * 81))
+    assert lockstep.utilisation(polygons, "repacked", 4, 16, 16) > 1.5 * waiting

@@ -19,17 +19,22 @@ REMARKS = {
 }
 
 
-class MicropolygonInput(Options, frozen=True, kw_only=True):
-    """How many micropolygons there are, and samples to test them at."""
+class DicedInput(Options, frozen=True, kw_only=True):
+    """How many micropolygons there are."""
+
+    edge: Annotated[float, Meta(gt=0)] = 1.0
+    """Micropolygons of patches have edges of at most so many pixels."""
+    triangles: bool = False
+    """Split micropolygons into triangles."""
+
+
+class MicropolygonInput(DicedInput, frozen=True, kw_only=True):
+    """Micropolygons, and samples to test them at."""
 
     spp: Annotated[int, Meta(ge=1, le=16)] = 1
     """Samples a pixel."""
     positions: str | None = None
     """File of sample positions (TOML), in place of the standard ones."""
-    edge: Annotated[float, Meta(gt=0)] = 1.0
-    """Micropolygons of patches have edges of at most so many pixels."""
-    triangles: bool = False
-    """Split micropolygons into triangles."""
 
 
 def frame_of(

@@ -18,7 +18,7 @@ STAGES = {  # folder of stages: pipelines that run them
     "eisenacher2010": ("micropolygon",),
     "laine2011": ("cudaraster",),
     "liu2010": ("freepipe",),
-    "fatahalian2009": ("stamps", "across-polygons"),
+    "fatahalian2009": ("stamps", "across-polygons", "interval", "interleaved"),
     "yao2011": ("bit-mask",),
     "ru2016": ("tiled", "per-primitive"),
     "zhang2025": ("binned",),

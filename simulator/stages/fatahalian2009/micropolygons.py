@@ -53,7 +53,7 @@ def from_patches(
 ) -> Micropolygons:
     """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels."""
     points = patches.points.astype(np.float64)
-    rates = _rates(_project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 16, 3), size)
+    rates = _rates(project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 16, 3), size)
     ends = np.cumsum(rates**2)
     polygons = np.empty((int(ends[-1]) if len(ends) else 0, 4, 4))
     _evaluate(points, rates, ends, polygons)
@@ -87,7 +87,7 @@ def _on_screen(
 ) -> Micropolygons:  # fmt: skip
     """Project, shade, and leave out what cannot be drawn."""
     corners = polygons.shape[1]
-    screen, usable = _project(polygons.reshape(-1, 4), matrix, width, height)
+    screen, usable = project(polygons.reshape(-1, 4), matrix, width, height)
     kept = usable.reshape(-1, corners).all(axis=1)
     vertices = screen.reshape(-1, corners, 3).astype(np.float32)[kept]
     made = Micropolygons(vertices, patch[kept].astype(np.int32), _shades(polygons)[kept], int((~kept).sum()))
@@ -100,7 +100,7 @@ def _split(polygons: Micropolygons) -> Micropolygons:
     return Micropolygons(halves, np.repeat(polygons.patch, 2), np.repeat(polygons.shade, 2), polygons.dropped)
 
 
-def _project(
+def project(
     points: NDArray[np.float64], matrix: ArrayLike, width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Screen positions (V, 3) of homogeneous points, and which of them can be used."""

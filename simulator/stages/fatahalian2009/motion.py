@@ -1,5 +1,7 @@
 """Motion blur and defocus: micropolygons that move, seen through a thin lens, at samples in x, y, time and lens.
 
+Both algorithms are parallel across polygons: a warp draws as many as it has lanes, a polygon a lane, and its lanes step
+through their samples together, so that a warp runs as long as its longest lane.
 A vertex moves on a straight line on screen while the shutter is open, and is displaced by its circle of confusion times
 the lens position (Fatahalian et al. 2009; Cook et al. 1987). A sample is a place in its pixel, a time in [0, 1] and a
 point of the unit disc. The pattern of samples is a tile that repeats over the screen.
@@ -11,28 +13,48 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tilestamp.models.coalescing import contiguous
 from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    blocks,
+    count_hits,
+    keep_nearest,
+    new_samples,
+)
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
+from tilestamp.simulator.work import Work
 
-CHUNK = 256  # polygons of a unit of work
+WARPS = 4  # in a block
+CORNER_BYTES = 28  # start, end and circle of confusion of a vertex
 MOST_SAMPLES = 1024  # a pixel
 
 
 @shown(*SAMPLE_COUNTERS)
 class MotionEvent(IntEnum):
-    """Events of one chunk of moving polygons."""
+    """Events of one warp of moving polygons."""
 
-    POLYGONS = 0
-    BOUNDS = 1  # boxes of a polygon over an interval of time and lens
-    SETUPS = 2  # polygons placed at one time and lens point and set up
-    SAMPLE_TESTS = 3
-    SAMPLE_HITS = 4
+    WARPS = 0  # one a unit: it draws polygons, a lane each
+    POLYGONS = 1
+    BOXES = 2  # of a polygon: over an interval of time and lens, or placed at one time and lens point and set up
+    BOX_WARPS = 3
+    SAMPLE_TESTS = 4
+    TEST_WARPS = 5  # warp executions of the sample test; that of intervals places and sets up its polygons first
+    SAMPLE_HITS = 6
+    HIT_WARPS = 7  # warp executions of depth and atomic
+    ATOMIC_LANES = 8
+    ATOMIC_REQUESTS = 9
+    ATOMIC_CONFLICTS = 10
+    ATOMIC_DEPTH = 11
+    LOAD_TRANSACTIONS = 12
+    LOAD_BYTES = 13
 
 
 class MovingMicropolygons(NamedTuple):
@@ -151,6 +173,62 @@ def _reversed_bits(n: NDArray[np.int64], base: int) -> NDArray[np.float64]:
     return result
 
 
+def motion_table(polygons: MovingMicropolygons, simt: Simt) -> NDArray[np.int64]:
+    """Empty work table: a row for each warp of polygons."""
+    return np.zeros((-(-len(polygons.start) // simt.warp), len(MotionEvent)), np.int64)
+
+
+def motion_work(
+    kernel: str, table: NDArray[np.int64], polygons: MovingMicropolygons, samples: Samples, simt: Simt, *more: Stream
+) -> Work:
+    """Make the launch of either algorithm: persistent warps that draw polygons from a queue; ``more``: other loads."""
+    loaded = int(table[:, MotionEvent.LOAD_BYTES].sum()) - sum(stream.bytes for stream in more)
+    footprint = sum(array.nbytes for array in polygons)
+    written = int(table[:, MotionEvent.ATOMIC_REQUESTS].sum()) * 32
+    streams = (
+        Stream("micropolygons", "load", loaded, footprint),
+        *more,
+        Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
+    )
+    return Work(
+        stage=kernel,
+        kernel=kernel,
+        events=MotionEvent,
+        table=table,
+        grid=blocks(simt, WARPS),
+        block=WARPS * simt.warp,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
+    )
+
+
+@kernel
+def begin_warp(first: int, last: int, corners: int, simt: Simt, row: Any) -> None:
+    """Count the loads of a warp's polygons, first..last-1."""
+    row[MotionEvent.WARPS] += 1
+    row[MotionEvent.POLYGONS] += last - first
+    size = corners * CORNER_BYTES
+    count, total = contiguous(first * size, (last - first) * size, simt.coalescing)
+    row[MotionEvent.LOAD_TRANSACTIONS] += count
+    row[MotionEvent.LOAD_BYTES] += total
+
+
+@kernel
+def end_test(samples: Samples, active: int, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
+    """Count one warp execution of the sample test, and the atomics of its hits."""
+    row[MotionEvent.TEST_WARPS] += 1
+    row[MotionEvent.SAMPLE_TESTS] += active
+    if hits:
+        row[MotionEvent.SAMPLE_HITS] += hits
+        row[MotionEvent.HIT_WARPS] += 1
+        lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
+        row[MotionEvent.ATOMIC_LANES] += lanes
+        row[MotionEvent.ATOMIC_REQUESTS] += requests
+        row[MotionEvent.ATOMIC_CONFLICTS] += conflicts
+        row[MotionEvent.ATOMIC_DEPTH] += depth
+
+
 @kernel
 def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, polygon: Any) -> None:
     """Write polygon p as it stands at a time and a lens point to ``polygon`` (3 or 4, 3)."""
@@ -162,14 +240,13 @@ def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, poly
 
 
 @kernel
-def test_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> int:
-    """One sample test of the polygon that is set up; returns 1 for a hit."""
+def test_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
+    """One sample test of the polygon that is set up; returns the byte address of a hit's atomic, -1 for none."""
     triangle = covering_triangle(setup[0], at_x, at_y)
     samples.tests[y, x] += 1
     if triangle < 0:
-        return 0
-    keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
-    return 1
+        return -1
+    return keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
 
 
 @kernel

@@ -1,0 +1,46 @@
+"""Interleaved: moving micropolygons placed at a tile's times and lens points, one by one (Fatahalian et al. 2009)."""
+
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._micropolygons import frame_of
+from tilestamp.simulator.pipelines._motion import MotionInput, moving_micropolygons
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, interleaved_pattern
+from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+
+
+class InterleavedOptions(MotionInput, frozen=True, kw_only=True):
+    """Options of the pipeline interleaved."""
+
+    persistent: ClassVar[bool] = True
+    tile: Annotated[int, Meta(ge=1, le=8)] = 2
+    """Pixels on a side of the tile whose samples all differ in time and lens point: 2 gives the paper's 16 at 4 spp."""
+
+
+def interleaved(
+    scene: Scene,
+    matrix: NDArray[Any],
+    width: int,
+    height: int,
+    simt: Simt,
+    options: InterleavedOptions,
+    execute: Executor,
+) -> Frame:
+    """Motion blur and defocus by interleaved sampling: a set-up for each time and lens point (Fatahalian et al. 2009).
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt, options, execute
+        See ``tilestamp.simulator.pipelines``.
+    """
+    pattern = interleaved_pattern(options.spp, options.tile)
+    samples = blur_samples(width, height, pattern)
+    still, moving = moving_micropolygons(scene, matrix, width, height, options)
+    execute(motion_interleaved, moving, pattern, samples, simt)
+    return frame_of(samples, still, execute.works)

@@ -1,0 +1,46 @@
+"""Interval: stochastic samples of moving micropolygons, found by boxes over intervals (Fatahalian et al. 2009)."""
+
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.frame import Frame
+from tilestamp.simulator.pipelines._micropolygons import frame_of
+from tilestamp.simulator.pipelines._motion import MotionInput, moving_micropolygons
+from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, stratified_pattern
+from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_interval
+
+
+class IntervalOptions(MotionInput, frozen=True, kw_only=True):
+    """Options of the pipeline interval."""
+
+    persistent: ClassVar[bool] = True
+    intervals: Annotated[int, Meta(ge=1, le=16)] | None = None
+    """Intervals of time and lens that share out a pixel's samples; none: as many as samples."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.intervals is not None and self.intervals > self.spp:
+            raise TilestampError(f"intervals is at most spp: {self.intervals} of {self.spp} samples a pixel")
+
+
+def interval(
+    scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: IntervalOptions, execute: Executor
+) -> Frame:
+    """Motion blur and defocus by boxes over intervals of time and lens (Pixar's way; Fatahalian et al. 2009).
+
+    Parameters
+    ----------
+    scene, matrix, width, height, simt, options, execute
+        See ``tilestamp.simulator.pipelines``.
+    """
+    pattern = stratified_pattern(options.spp)
+    samples = blur_samples(width, height, pattern)
+    still, moving = moving_micropolygons(scene, matrix, width, height, options)
+    execute(motion_interval, moving, pattern, samples, simt, options.intervals)
+    return frame_of(samples, still, execute.works)
