@@ -8,21 +8,20 @@ from tests.test_counts_of_warps import HOPPER, by_machine, nonzero
 from tests.test_stamps import HEIGHT, WIDTH, soup
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.pipelines._motion import MotionInput, eye_distances, moving_micropolygons
 from tilestamp.simulator.scenes import load_scene, read_camera
 from tilestamp.simulator.scenes.camera import fit_camera
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import BACKGROUND
-from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, project
+from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, micropolygons, project
 from tilestamp.simulator.stages.fatahalian2009.motion import (
     MotionEvent,
     blur_samples,
-    circle_of_confusion,
     interleaved_pattern,
     moved,
     stratified_pattern,
 )
 from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
+from tilestamp.simulator.stages.fatahalian2009.thin_lens import circle_of_confusion, defocus, eye_distances
 
 PATTERNS = {"stratified": stratified_pattern(4, tile=3), "interleaved": interleaved_pattern(2, tile=2)}
 
@@ -179,11 +178,20 @@ def extent(pipeline, **options):
 def test_what_lies_at_the_focus_is_sharp_and_the_rest_by_its_distance():
     scene = load_scene("teapot")
     matrix = read_camera("default", scene).matrix(96, 72)
-    focus = float(eye_distances(moving_micropolygons(scene, matrix, 96, 72, MotionInput())[0], matrix, 96, 72)[5, 1])
-    still, moving = moving_micropolygons(scene, matrix, 96, 72, MotionInput(lens=6.0, focus=focus))
-    distance = eye_distances(still, matrix, 96, 72)
-    assert moving.blur[5, 1] == 0
-    assert moving.blur == pytest.approx(6.0 * np.abs(1 - focus / distance), abs=1e-5)
+    polygons = micropolygons(scene, matrix, 96, 72)
+    distance = eye_distances(polygons, matrix, 96, 72)
+    for focus, used in ((distance[5, 1], distance[5, 1]), (None, distance.mean())):
+        blur = defocus(polygons, matrix, 96, 72, focus, 6.0)
+        assert blur == pytest.approx(6.0 * np.abs(1 - used / distance), abs=1e-5)
+
+
+def test_a_lens_out_of_focus_blurs_the_picture():
+    images = [
+        simulate("teapot", "interleaved", width=96, height=72, fidelity="counts", motion=0.0, **lens).image
+        for lens in ({"lens": 0.0}, {"lens": 6.0}, {"lens": 6.0, "focus": 1e6})
+    ]
+    near, far = (int(np.abs(image.astype(int) - images[0]).sum()) for image in images[1:])
+    assert 0 < 1.5 * near < far
 
 
 def test_distances_are_those_of_the_camera():

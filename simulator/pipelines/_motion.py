@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from tilestamp.simulator.pipelines._micropolygons import DicedInput
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, micropolygons
-from tilestamp.simulator.stages.fatahalian2009.motion import MovingMicropolygons, circle_of_confusion, moved
+from tilestamp.simulator.stages.fatahalian2009.motion import MovingMicropolygons, moved
+from tilestamp.simulator.stages.fatahalian2009.thin_lens import defocus
 
 
 class MotionInput(DicedInput, frozen=True, kw_only=True):
@@ -30,19 +31,9 @@ class MotionInput(DicedInput, frozen=True, kw_only=True):
 def moving_micropolygons(
     scene: Scene, matrix: NDArray[Any], width: int, height: int, options: MotionInput
 ) -> tuple[Micropolygons, MovingMicropolygons]:
-    """Dice the scene as it stands when the shutter opens, and let it move; an orthographic view has no defocus."""
+    """Dice the scene as it stands when the shutter opens, and let it move."""
     still = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
     flat = scene.mesh is not None and scene.mesh.clip_space
-    distance = eye_distances(still, np.eye(4) if flat else matrix, width, height)
-    focus = options.focus or (float(distance.mean()) if distance.size else 1.0)
+    blur = defocus(still, np.eye(4) if flat else matrix, width, height, options.focus, options.lens)
     angle = np.radians(options.direction)
-    way = options.motion * np.array([np.cos(angle), -np.sin(angle)])
-    return still, moved(still, way, circle_of_confusion(distance, focus, options.lens))
-
-
-def eye_distances(polygons: Micropolygons, matrix: NDArray[Any], width: int, height: int) -> NDArray[np.float64]:
-    """Distance of each vertex along the line of sight, (M, 3 or 4): w before the division, found by going back."""
-    x, y, depth = np.moveaxis(polygons.vertices.astype(np.float64), -1, 0)
-    clip = np.stack([2 * x / width - 1, 1 - 2 * y / height, 2 * depth - 1, np.ones_like(x)])
-    distances: NDArray[np.float64] = 1.0 / np.tensordot(np.linalg.inv(matrix)[3], clip, axes=1)
-    return distances
+    return still, moved(still, options.motion * np.array([np.cos(angle), -np.sin(angle)]), blur)

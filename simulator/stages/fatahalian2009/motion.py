@@ -104,12 +104,6 @@ def moved(polygons: Micropolygons, way: ArrayLike, blur: ArrayLike = 0.0) -> Mov
     return MovingMicropolygons(start, end, np.broadcast_to(np.asarray(blur, np.float32), start.shape[:2]).copy())
 
 
-def circle_of_confusion(distance: ArrayLike, focus: float, aperture: float) -> NDArray[np.float32]:
-    """Radius in pixels of a thin lens: ``aperture`` pixels at infinite distance, none at ``focus``."""
-    away = np.asarray(distance, np.float64)
-    return (aperture * np.abs(away - focus) / away).astype(np.float32)
-
-
 def stratified_pattern(spp: int, tile: int = 32, seed: int = 7) -> BlurPattern:
     """Make samples for intervals: sample s of every pixel lies in stratum s of time, of the lens, and of the pixel.
 
