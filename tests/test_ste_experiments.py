@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tilestamp.experiments.ste import algorithms, aspect, blur, closed_form, eisenacher, lockstep
+from tilestamp.experiments.ste import algorithms, aspect, bit_mask, blur, closed_form, eisenacher, lockstep, readings
 from tilestamp.experiments.ste.setting import cube, mean_area, random_polygons, student
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
@@ -113,3 +113,32 @@ def test_a_lane_of_lockstep_waits_for_the_longest_and_repacking_fills_it():
     waiting = lockstep.utilisation(polygons, "in-order", 4, 16, 16)
     assert waiting == pytest.approx(100 * (81 + 3) / (4 * 81))
     assert lockstep.utilisation(polygons, "repacked", 4, 16, 16) > 1.5 * waiting
+
+
+def test_the_paper_s_own_reading_is_the_gain_of_the_experiment():
+    gain = bit_mask._measure(cube(), 4, 48)["gain"]
+    assert readings.gains(cube(), 4, 48)[f"hits a test, {readings.EACH}"] == pytest.approx(gain)
+
+
+def test_useful_hits_are_the_same_with_and_without_a_mask():
+    """So that their rate rises as tests fall, and the most under one mask, which the back of a cube shares."""
+    found = readings.gains(cube(), 4, 48)
+    assert found[f"useful hits a test, {readings.ONE}"] > 1.3 * found[f"useful hits a test, {readings.EACH}"]
+
+
+def test_half_of_a_tiny_cube_s_faces_face_the_eye():
+    polygons = cube().on_screen(2, 48, 36)
+    front = readings._faces_eye(polygons)
+    assert 0.3 < front.mean() < 0.7
+    depth = polygons.vertices[..., 2].mean(axis=1)
+    assert depth[front].mean() < depth[~front].mean()
+
+
+def test_a_reading_says_both_only_where_it_reproduces_both():
+    both, one = readings.Reading("a", [1.0, 1.3], [3.1]), readings.Reading("b", [1.31], [2.0])
+    assert readings.said([both, one])[:3] == [
+        "Readings that reproduce both +30 % and a factor of 3: a.",
+        "Readings that reproduce bigguy's 1.3: a; b.",
+        "Readings that reproduce cube's 3: a.",
+    ]
+    assert readings.as_table([both, one])["cube_reproduced"].tolist() == [True, False]
