@@ -71,6 +71,15 @@ def test_the_table_has_times_shares_ratios_and_the_term_that_changed(capsys):
     assert change[5:8] == [f"{terms[0]:.4g}", f"{terms[1]:.4g}", f"{terms[1] / terms[0]:.4g}"]
 
 
+def test_where_what_holds_did_not_change_the_term_that_did_is_named(capsys):
+    dram = ["--set", "memory.dram_gb_per_s=140.0", "--set", "memory.dram_gb_per_s=14.0"]
+    assert run_command(["compare", "teapot", *SMALL, *dram]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    change = [line for line in lines if line[:1] == ["bound_and_split"]][1]
+    assert change[2:5] == ["balance", "balance", "dram"]
+    assert float(change[-1]) == pytest.approx(10.0, rel=0.2)  # a kernel's own bytes are a tenth as fast
+
+
 def test_pipelines_of_other_stages_are_compared_by_the_frame(capsys, tmp_path):
     plot = tmp_path / "plot.png"
     arguments = ["compare", "spot", *SMALL, "--machine", "gtx480", "-o", str(plot)]

@@ -218,3 +218,10 @@ def test_a_question_runs_coarse_first_and_then_finer_what_may_be_the_best(execut
     assert table["milliseconds_low"][2] < table["milliseconds"][2] < table["milliseconds_high"][2]
     exact = simulate("teapot", machine=altered(load_machine("gtx280"), {"sm.count": 2}), width=160, height=120)
     assert table["milliseconds"][0] == pytest.approx(exact.milliseconds, rel=0.0005)
+
+
+def test_a_frame_too_small_to_sample_has_an_interval_of_no_width():
+    study = Study(fixed={"scene": "teapot", "size": "64x48"}, error=0.05)
+    study.run(jobs=1)
+    cell = study.table().iloc[0]
+    assert cell["milliseconds_low"] == cell["milliseconds"] == cell["milliseconds_high"]

@@ -30,6 +30,10 @@ SCENE = '[fixed]\nscene = "teapot"\nsize = "64x48"\n'  # three lines
         (SCENE + "[grid]\nzoom = [1, 0]", 5, "zoom must be above 0"),
         (SCENE + "[grid]\n\ntile = []", 6, "a value at least"),
         (SCENE + "[grid]\nmethod = { a = 4 }", 5, "the parameters of each"),
+        (SCENE + "[grid]\nmethod = {}", 5, "a value at least"),
+        (SCENE + "[grid]\nzoom = { from = 1, to = 2, points = 2000000 }", 5, "scale: points: expected int <= 1000000"),
+        (SCENE + "[grid]\ntile = [4]\norbit = [inf]", 6, "orbit takes a number"),
+        (SCENE + "seed = -1", 4, "seed takes a whole number of 0 or more"),
         (SCENE + "[zip]\ntile = [4, 8]\nspp = [1]", 4, "tile has 2, spp has 1"),
         (SCENE + "[grid]\ntile = [4]\n[zip]\ntile = [8]", 6, "tile is set by grid.tile too"),
         (SCENE + "[sample]\npoints = 0\naxes.zoom = { from = 1, to = 2 }", 5, "int >= 1"),
@@ -152,3 +156,19 @@ def test_a_fault_of_ours_is_named_with_exit_code_1_and_the_other_cells_go_on(tmp
     assert run_command(["study", str(tmp_path / "a.toml"), "-j", "1"]) == 1
     assert "failed: ZeroDivisionError: division by zero" in capsys.readouterr().out
     assert len(read_study(tmp_path / "a.toml", tmp_path / "a.sqlite").table()) == 1
+
+
+def test_a_name_that_no_cell_has_is_said_with_its_line(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text("title = 'a'\nrecord = ['millisecond']\n" + SCENE)
+    assert run_command(["study", str(tmp_path / "a.toml"), "-j", "1"]) == BAD_INPUT
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "a.toml:2: record: no cell has millisecond (did you mean" in said
+
+
+def test_a_cell_without_a_time_saved_no_execution_and_the_table_of_one_column_is_printed(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text(SCENE + '"sm.registers" = 1\n')
+    assert run_command(["study", str(tmp_path / "a.toml"), "-j", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "1 cell: 1 run by " in said
+    assert "saved" not in said
+    assert "contradicts itself" in said

@@ -4,12 +4,14 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from math import isclose
 from pathlib import Path
 from typing import Any
 
 from tilestamp.experiments.commands.terminal import print_table, writing
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.why import LITTLE
 
 FRAME = "frame"
 
@@ -100,7 +102,7 @@ def print_comparison(runs: Sequence[Compared]) -> None:
         sys.stdout.write("\n")
         columns = ["stage", "run", "held by", "then", "term", "ms", "then ms", "ratio"]
         print_table(
-            "What holds, and how that term changed; where none holds, the largest change",
+            "What holds, and how that term changed; where it did not, the largest change",
             columns,
             rows,
             keys=2,
@@ -124,14 +126,15 @@ def _differs(stage: str, first: Compared, run: Compared) -> bool:
 
 
 def _change(stage: str, first: Compared, run: Compared) -> list[str]:
-    """What holds a stage in two runs, and how that term changed; where no term holds, the one that changed most."""
+    """What holds a stage in two runs, and how that term changed; where it did not, the one that changed most."""
     before, after = first.terms[stage], run.terms[stage]
     row = [stage, run.name, first.bounds[stage], run.bounds[stage]]
     both = before.keys() & after.keys()
     if not both:
         return [*row, "", "", "", ""]
-    held = [name for name in (first.bounds[stage], run.bounds[stage]) if name in both]
-    term = held[0] if held else max(sorted(both), key=lambda name: abs(after[name] - before[name]))
+    held = both & {first.bounds[stage], run.bounds[stage]}
+    moved = {name for name in held if not isclose(after[name], before[name], rel_tol=LITTLE)} or both
+    term = max(sorted(moved), key=lambda name: abs(after[name] - before[name]))
     ratio = f"{after[term] / before[term]:.4g}" if before[term] else ""
     return [*row, term, f"{before[term]:.4g}", f"{after[term]:.4g}", ratio]
 

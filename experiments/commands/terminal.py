@@ -98,7 +98,7 @@ def _parts(lines: Sequence[Sequence[str]], keys: int, width: int) -> list[list[i
     """Columns of each part that fits the width: the keys, whose words may go on below, and whole columns."""
     key_words = [max((len(word) for line in lines for word in line[key].split()), default=0) for key in range(keys)]
     room = width + GAP - sum(word + GAP for word in key_words)  # none after the last
-    parts: list[list[int]] = []
+    parts: list[list[int]] = [] if keys < len(lines[0]) else [list(range(keys))]
     left = 0
     for column in range(keys, len(lines[0])):
         needed = max(len(line[column]) for line in lines) + GAP

@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from tilestamp.experiments.studies.places import place
+from tilestamp.experiments.studies.places import place, refused
 from tilestamp.models.errors import TilestampError
 
 MOST_POINTS = 1_000_000  # of one range or sample: they are lists
@@ -67,18 +67,13 @@ def choices(name: str, axis: Axis, *, whole: bool) -> list[Choice]:
     whole : bool
         Whether the parameter is a whole number: those of a range are rounded.
     """
-    if not isinstance(axis, Mapping):
-        values = list(axis) if isinstance(axis, Sequence | np.ndarray) and not isinstance(axis, str) else [axis]
-    elif is_range(axis):
-        span = _range(axis)
-        if span.points is None:
-            raise TilestampError('a range needs points, such as { from = 1, to = 4, points = 5, scale = "log" }')
-        values = _rounded(span.at(np.linspace(0.0, 1.0, span.points)), whole)
+    if isinstance(axis, Mapping) and not is_range(axis):
+        found = [_variant(name, label, parameters) for label, parameters in axis.items()]
     else:
-        return [_variant(name, label, parameters) for label, parameters in axis.items()]
-    if not values:
+        found = [Choice({name: shown(value)}, {name: value}) for value in _values(axis, whole)]
+    if not found:
         raise TilestampError("an axis needs a value at least")
-    return [Choice({name: shown(value)}, {name: value}) for value in values]
+    return found
 
 
 def is_range(axis: Axis) -> TypeGuard[Mapping[str, Any]]:
@@ -127,15 +122,24 @@ def shown(value: object) -> Any:
     return json.dumps(value) if isinstance(value, list | dict) else str(value)
 
 
+def _values(axis: Axis, whole: bool) -> list[Any]:
+    """Values of a list, of a range, or the lone one."""
+    if not is_range(axis):
+        return list(axis) if isinstance(axis, Sequence | np.ndarray) and not isinstance(axis, str) else [axis]
+    span = _range(axis)
+    if span.points is None:
+        raise TilestampError('a range needs points, such as { from = 1, to = 4, points = 5, scale = "log" }')
+    values = span.at(np.linspace(0.0, 1.0, span.points))
+    return list(dict.fromkeys(map(round, values))) if whole else values
+
+
 def _range(axis: Mapping[str, Any]) -> Range:
     try:
         return msgspec.convert(dict(axis), Range)
     except msgspec.ValidationError as error:
-        raise TilestampError(f"a range has from, to, points and scale: {str(error).replace('`', '')}") from error
-
-
-def _rounded(values: list[float], whole: bool) -> list[Any]:
-    return list(dict.fromkeys(round(value) for value in values)) if whole else values
+        keys, why = refused(error)
+        told = ": ".join(("a range has from, to, points and scale", *keys, why))
+        raise TilestampError(told) from error
 
 
 def _variant(name: str, label: str, parameters: object) -> Choice:

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from tilestamp.experiments.studies.axes import Axis, Choice, Sample, choices, merged, sampled, zipped
-from tilestamp.experiments.studies.places import StudyError, place
+from tilestamp.experiments.studies.places import StudyError, place, refused
 from tilestamp.experiments.studies.plan import Factor, cell_count
 from tilestamp.experiments.studies.store import Store
 from tilestamp.experiments.studies.values import KNOWN, SHARED, TIMES, is_whole
@@ -105,8 +105,8 @@ class Design:
             try:
                 sample = msgspec.convert(self.sample, Sample)
             except msgspec.ValidationError as error:
-                message, _, key = str(error).replace("`", "").partition(" - at $.")
-                raise StudyError(("sample", key) if key else ("sample",), message[:1].lower() + message[1:]) from error
+                keys, why = refused(error)
+                raise StudyError(("sample", *keys), why) from error
             return sampled(sample, {name: is_whole(name, self.pipelines) for name in sample.axes})
 
     @cached_property

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from tilestamp.models.errors import TilestampError
+from tilestamp.experiments.studies.places import StudyError
 from tilestamp.models.nearest_name import did_you_mean
 
 Values = Mapping[str, Any]
@@ -44,7 +44,7 @@ class Names:
             cells = list(self._stored())
             for name in sorted(name for name in self._left if not any(has(values, name) for values in cells)):
                 told = did_you_mean(name, self._known)
-                raise TilestampError(f"record: no cell has {name}{told}; what was computed is stored")
+                raise StudyError(("record",), f"no cell has {name}{told}; what was computed is stored")
             self._left = set()
 
 

@@ -5,7 +5,9 @@ import json
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+from msgspec import Meta
 
 from tilestamp.experiments.studies.places import place
 from tilestamp.experiments.studies.sources import sources_digest
@@ -103,7 +105,7 @@ class Resolver:
         matrix = self._matrix(scene, given, width, height)
         options = self._options(given)
         with place("seed"):
-            seed = checked("seed", int, given["seed"])
+            seed = checked("seed", Annotated[int, Meta(ge=0)], given["seed"])
         what = [digest, pipeline, options, width, height, matrix, seed, error, sources]
         persistent = self._once(("persistent", pipeline), lambda: options_type(pipeline).persistent)
         return Execution(
@@ -150,8 +152,10 @@ class Resolver:
         camera, zoom, orbit = given["camera"], given["zoom"], given["orbit"]
         with place("camera"):
             found = self._once(("camera", scene.name, repr(camera)), lambda: read_camera(camera, scene))
+        with place("orbit"):
+            orbit = checked("orbit", float, orbit)
         with place("zoom"):
-            zoom, orbit = checked("zoom", float, zoom), checked("orbit", float, orbit)
+            zoom = checked("zoom", float, zoom)
             moved = moved_camera(found, width, height, zoom, orbit)
         matrix: list[list[float]] = clip_matrix(moved, width, height).tolist()
         return matrix

@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import msgspec
+
 from tilestamp.models.errors import TilestampError
 
 Place = tuple[str, ...]
@@ -19,6 +21,12 @@ class StudyError(TilestampError):
         self.place = place
         self.sentence = sentence
         super().__init__(f"{'.'.join(place)}: {sentence}" if place else sentence)
+
+
+def refused(error: msgspec.ValidationError) -> tuple[Place, str]:
+    """What msgspec refuses: the path of its key, and why."""
+    message, _, where = str(error).replace("`", "").partition(" - at $")
+    return tuple(key for key in where.split(".") if key), message[:1].lower() + message[1:]
 
 
 @contextmanager

@@ -45,6 +45,8 @@ class Recorded:
         if self._run.sampled:
             _, low, high = self.run.milliseconds_interval
             found |= {"milliseconds_low": low, "milliseconds_high": high}
+        elif self._run.error:  # too small to pay for a sample
+            found |= dict.fromkeys(("milliseconds_low", "milliseconds_high"), self._of(None, "milliseconds"))
         return found
 
     def known(self) -> list[str]:

@@ -82,22 +82,26 @@ class Store:
 
     def _open(self) -> None:
         """See that the file is ours, and make its tables if it is new."""
-        self._base.execute("PRAGMA journal_mode = WAL")
+        if self._is_new():
+            self._base.execute("PRAGMA journal_mode = WAL")  # of a file for good: of no other program's
+            with self._transaction():
+                if self._is_new():  # another process may have been quicker
+                    for statement in TABLES.split(";")[:-1]:
+                        self._base.execute(statement)
+                    self._base.execute(f"PRAGMA application_id = {APPLICATION}")
+                    self._base.execute(f"PRAGMA user_version = {SCHEMA}")
         self._base.execute("PRAGMA synchronous = NORMAL")
-        with self._transaction():
-            application, schema = self._pragma("application_id"), self._pragma("user_version")
-            if not application and not self._base.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-                for statement in TABLES.split(";")[:-1]:
-                    self._base.execute(statement)
-                self._base.execute(f"PRAGMA application_id = {APPLICATION}")
-                self._base.execute(f"PRAGMA user_version = {SCHEMA}")
-                return
+        application, schema = self._pragma("application_id"), self._pragma("user_version")
         if application != APPLICATION:
             raise TilestampError(f"{self.path} is a database, but no store of studies: name another file")
         if schema != SCHEMA:
             raise TilestampError(
                 f"{self.path} is a store of schema {schema}, and this tilestamp has schema {SCHEMA}: name another file"
             )
+
+    def _is_new(self) -> bool:
+        tables = self._base.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        return not tables and not self._pragma("application_id")
 
     def _pragma(self, name: str) -> int:
         return int(self._base.execute(f"PRAGMA {name}").fetchone()[0])

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from tilestamp.experiments.studies.places import Place, StudyError, line_of
+from tilestamp.experiments.studies.places import StudyError, line_of, refused
 from tilestamp.experiments.studies.store import Store
 from tilestamp.experiments.studies.study import Study
 from tilestamp.models.errors import TilestampError
@@ -101,10 +101,9 @@ def read_study(path: str | Path, store: Store | str | Path | None = None) -> Stu
 
 def _refused(error: msgspec.ValidationError) -> StudyError:
     """What msgspec refuses: which key, and why."""
-    message, _, where = str(error).replace("`", "").partition(" - at $")
-    place: Place = tuple(key for key in where.split(".") if key)
-    if "unknown field" in message:
-        name = message.rpartition(" ")[2]
+    place, why = refused(error)
+    if "unknown field" in why:
+        name = why.rpartition(" ")[2]
         known = _File.__struct_fields__
         return StudyError((*place, name), f"no key of a study{did_you_mean(name, known)}; there are {', '.join(known)}")
-    return StudyError(place, message[:1].lower() + message[1:])
+    return StudyError(place, why)
