@@ -207,3 +207,12 @@ def test_distances_are_those_of_the_camera():
 def test_more_intervals_than_samples_are_refused():
     with pytest.raises(TilestampError, match="intervals is at most spp: 5 of 4 samples"):
         simulate("teapot", "interval", width=8, height=8, intervals=5)
+
+
+def test_the_options_reach_the_stages():
+    small = {"width": 48, "height": 36, "fidelity": "counts", "spp": 4}
+    boxes = [
+        simulate("teapot", pipeline, **small, **options).counts[f"{pipeline}.BOXES"]
+        for pipeline, options in (("interval", {}), ("interval", {"intervals": 2}), ("interleaved", {"tile": 2}))
+    ]
+    assert boxes == [boxes[0], boxes[0] // 2, 4 * boxes[0]]
