@@ -7,6 +7,7 @@ import pytest
 
 from tilestamp import read_study, simulate
 from tilestamp.experiments.command_line import BAD_INPUT, INTERRUPTED, run_command
+from tilestamp.experiments.studies import cells
 from tilestamp.experiments.studies.places import line_of
 
 SCENE = '[fixed]\nscene = "teapot"\nsize = "64x48"\n'  # three lines
@@ -172,3 +173,12 @@ def test_a_cell_without_a_time_saved_no_execution_and_the_table_of_one_column_is
     assert "1 cell: 1 run by " in said
     assert "saved" not in said
     assert "contradicts itself" in said
+
+
+def test_a_command_resolves_each_cell_once(tmp_path, monkeypatch):
+    walks = []
+    walk = cells.walk
+    monkeypatch.setattr(cells, "walk", lambda *of: walks.append(1) or (yield from walk(*of)))
+    (tmp_path / "a.toml").write_text(SCENE + "[grid]\ntile = [4, 8]\n")
+    assert run_command(["study", str(tmp_path / "a.toml"), "-j", "1"]) == 0
+    assert len(walks) == 1

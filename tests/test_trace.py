@@ -170,3 +170,17 @@ def test_a_queue_that_is_served_in_time_has_no_backlog():
     backlogs = [t.counters["atomic backlog us"][1] for t in timeline(run) if "atomic backlog us" in t.counters]
     assert backlogs
     assert min(values.min() for values in backlogs) == 0.0
+
+
+def test_each_event_has_what_the_format_asks_of_its_kind(events):
+    numbers = {"X": ("ts", "dur", "tid"), "C": ("ts",), "M": ("tid",)}
+    for event in events:
+        assert isinstance(event["pid"], int)
+        assert isinstance(event["name"], str)
+        assert all(event[key] >= 0 for key in numbers[event["ph"]])
+    for event in events:
+        if event["ph"] == "M":
+            assert event["name"] in ("process_name", "thread_name")
+            assert list(event["args"]) == ["name"]
+        if event["ph"] == "C":
+            assert all(isinstance(value, int | float) for value in event["args"].values())

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.terminal import print_table, progress
-from tilestamp.experiments.studies.forecast import MOST_LISTED
+from tilestamp.experiments.studies.cells import MOST_LISTED
+from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.places import StudyError
 from tilestamp.experiments.studies.store import Store
 from tilestamp.experiments.studies.study_file import StudyFile
@@ -54,21 +55,21 @@ def study(
         Write the table as .csv, or as .parquet where pyarrow is installed.
     """
     _check(output, jobs)
-    read, path = StudyFile(file), store or file.with_suffix(".sqlite")
+    read, path, resolver = StudyFile(file), store or file.with_suffix(".sqlite"), Resolver()
     try:
         with closing(Store(path, create=False)) as kept:  # nothing is written before all is known to be right
             asked = read.study(kept)
             agree(len(asked), yes=yes or dry_run)
             with progress("looking at the study"):
-                expected = asked.forecast(jobs)
+                expected = asked.forecast(jobs, resolver)
         sys.stdout.write(f"{asked.title or file.stem}: {expected.sentence()}\n")
         sys.stdout.flush()
         if dry_run:
             return 0
         with closing(Store(path)) as kept, progress("running the study") as say:
             asked = read.study(kept)
-            summary = asked.run(jobs, cluster, say)
-            table = asked.table()
+            summary = asked.run(jobs, cluster, say, resolver)
+            table = asked.table(resolver)
     except StudyError as error:
         raise read.placed(error) from None
     sys.stdout.writelines(f"{sentence}\n" for sentence in (*summary.changed, *summary.sentences()))

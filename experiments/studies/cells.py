@@ -1,6 +1,6 @@
 """The cells of a study beside what the store has of them."""
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 MOST_PRICED = 250  # cells of one group
+MOST_LISTED = 1_000_000  # cells up to which all are listed, and looked up before a run
 MOST_ROWS = 10_000_000  # of a table
 COARSE = "coarse"  # column of a study with a question: whether a cell is known less well than the error
 
@@ -27,7 +28,7 @@ def looked_up(
     """Go through all groups of a study, each with what the store says of its cells at an error (and of others)."""
     waiting: list[Group] = []
     keys: list[bytes] = []
-    for group in walk(study.factors, study.fixed, resolver, error, MOST_PRICED):
+    for group in _groups(study, resolver, error):
         waiting.append(group)
         keys += [cell.key for cell in group.cells]
         if len(keys) >= MANY:
@@ -38,6 +39,12 @@ def looked_up(
     yield from ((group, found) for group in waiting)
 
 
+def _groups(study: Design, resolver: Resolver, error: float) -> Iterable[Group]:
+    """All groups, resolved once by one resolver where they are not too many to be kept."""
+    groups = walk(study.factors, study.fixed, resolver, error, MOST_PRICED)
+    return resolver.once(("groups", error), lambda: list(groups)) if len(study) <= MOST_LISTED else groups
+
+
 def missing(study: Design, resolver: Resolver, error: float, wanted: Container[int] | None = None) -> Iterator[Group]:
     """Go through the groups of cells that are not stored; of those whose place is ``wanted``, if that is given."""
     for group, found in looked_up(study, resolver, error, study.kept.has):
@@ -46,11 +53,10 @@ def missing(study: Design, resolver: Resolver, error: float, wanted: Container[i
             yield group._replace(cells=cells)
 
 
-def rows(study: Design) -> list[tuple[Cell, Stored]]:
+def rows(study: Design, resolver: Resolver) -> list[tuple[Cell, Stored]]:
     """All cells that are stored, in the study's order, each as well known as it is."""
     if len(study) > MOST_ROWS:
         raise TilestampError(f"a table of {len(study):,} rows is too long; take the store's own")
-    resolver = Resolver()
     found: dict[int, tuple[Cell, Stored]] = {}
     for error in study.errors:
         for group, stored in looked_up(study, resolver, error, study.kept.find):
@@ -58,9 +64,10 @@ def rows(study: Design) -> list[tuple[Cell, Stored]]:
     return [found[order] for order in sorted(found)]
 
 
-def candidates(study: Design) -> list[Candidate]:
+def candidates(study: Design, resolver: Resolver) -> list[Candidate]:
     """All cells that are stored and have a time."""
-    return [_candidate(cell, stored) for cell, stored in rows(study) if stored.numbers.get("milliseconds") is not None]
+    found = rows(study, resolver)
+    return [_candidate(cell, stored) for cell, stored in found if stored.numbers.get("milliseconds") is not None]
 
 
 def _candidate(cell: Cell, stored: Stored) -> Candidate:
@@ -69,9 +76,9 @@ def _candidate(cell: Cell, stored: Stored) -> Candidate:
     return Candidate(cell.order, cell.shown, *ends)
 
 
-def table(study: Design) -> "pd.DataFrame":
+def table(study: Design, resolver: Resolver) -> "pd.DataFrame":
     """All cells of a study that are stored, a row each."""
-    found = rows(study)
+    found = rows(study, resolver)
     places = [{name: cell.shown.get(name) for name in study.axes} for cell, _ in found]
     wanted = _columns(study, [stored.numbers for _, stored in found])
     numbers = [{name: stored.numbers.get(name) for name in wanted} for _, stored in found]

@@ -4,13 +4,12 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from tilestamp.experiments.studies.cells import missing
+from tilestamp.experiments.studies.cells import MOST_LISTED, missing
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.plan import Group
 from tilestamp.experiments.studies.store import Rates, Store
 
-MOST_LISTED = 1_000_000  # cells up to which the store is asked what is missing
 GUESS = Rates(0.25, 1e6, 0.03)  # assumed, until a study has run
 WORTH = 5.0  # seconds for which it pays to start processes
 
@@ -51,9 +50,8 @@ class Forecast:
         )
 
 
-def forecast(study: Design, jobs: int | None = None) -> Forecast:
+def forecast(study: Design, resolver: Resolver, jobs: int | None = None) -> Forecast:
     """Say what a run would do; all names and values are checked on the way."""
-    resolver = Resolver()
     if len(study) > MOST_LISTED:
         return _large(study, resolver, jobs)
     return forecast_of(study, list(missing(study, resolver, study.errors[0])), jobs)

@@ -1,12 +1,12 @@
 """What a cell is: what is executed, and on what it is priced, each resolved from parameters and with a digest."""
 
 import hashlib
-import json
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import msgspec
 from msgspec import Meta
 
 from tilestamp.experiments.studies.places import place
@@ -100,14 +100,14 @@ class Resolver:
             width, height = pixels(given["size"])
         with place("scene"):
             source = given["scene"]
-            scene, digest = self._once(("scene", _name(source)), lambda: _loaded(source))
+            scene, digest = self.once(("scene", _name(source)), lambda: _loaded(source))
             self.inputs["scene", scene.name] = digest
         matrix = self._matrix(scene, given, width, height)
         options = self._options(given)
         with place("seed"):
             seed = checked("seed", Annotated[int, Meta(ge=0)], given["seed"])
         what = [digest, pipeline, options, width, height, matrix, seed, error, sources]
-        persistent = self._once(("persistent", pipeline), lambda: options_type(pipeline).persistent)
+        persistent = self.once(("persistent", pipeline), lambda: options_type(pipeline).persistent)
         return Execution(
             source, digest, pipeline, options, width, height, matrix, seed, error, sources, persistent, _digest(what)
         )
@@ -116,7 +116,7 @@ class Resolver:
         """Resolve on what it is priced; raises StudyError."""
         given = {**PRICED, **parameters}
         with place("machine"):
-            machine = self._once(("machine", _name(given["machine"])), lambda: load_machine(given["machine"]))
+            machine = self.once(("machine", _name(given["machine"])), lambda: load_machine(given["machine"]))
             self.inputs["machine", machine.name] = machine.digest
         with place("fidelity"):
             if given["fidelity"] not in FIDELITIES:
@@ -135,7 +135,7 @@ class Resolver:
         what = [machine.digest, sorted(changes.items()), given["fidelity"]]
         return Pricing(machine, changes, given["fidelity"], shapes, _digest(what))
 
-    def _once(self, key: Hashable, make: Callable[[], T]) -> T:
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
         """Make something once."""
         if key not in self._known:
             self._known[key] = make()
@@ -151,7 +151,7 @@ class Resolver:
     def _matrix(self, scene: Scene, given: Mapping[str, Any], width: int, height: int) -> list[list[float]]:
         camera, zoom, orbit = given["camera"], given["zoom"], given["orbit"]
         with place("camera"):
-            found = self._once(("camera", scene.name, repr(camera)), lambda: read_camera(camera, scene))
+            found = self.once(("camera", scene.name, repr(camera)), lambda: read_camera(camera, scene))
         with place("orbit"):
             orbit = checked("orbit", float, orbit)
         with place("zoom"):
@@ -166,14 +166,14 @@ class Resolver:
         named = {name: value for name, value in given.items() if name not in KNOWN}
         for name, value in named.items():
             with place(name):
-                self._once(("option", pipeline, name, repr(value)), lambda n=name, v=value: option(pipeline, n, v))  # type: ignore[misc]
-        return self._once(("options", pipeline, repr(named)), lambda: plain(pipeline_options(pipeline, named)))
+                self.once(("option", pipeline, name, repr(value)), lambda n=name, v=value: option(pipeline, n, v))  # type: ignore[misc]
+        return self.once(("options", pipeline, repr(named)), lambda: plain(pipeline_options(pipeline, named)))
 
     def _shape(self, machine: Machine, changes: Mapping[str, Any]) -> Simt | None:
         """Give what counting depends on, of the machine with its changes."""
         shaping = {key: value for key, value in changes.items() if key in SHAPE}
         try:
-            simt = self._once(
+            simt = self.once(
                 ("shape", machine.digest, repr(sorted(shaping.items()))), lambda: altered(machine, shaping).simt
             )
         except TilestampError:
@@ -192,7 +192,7 @@ def _loaded(source: str | Path | Scene) -> tuple[Scene, str]:
 
 
 def _digest(what: object) -> bytes:
-    return hashlib.blake2b(json.dumps(what, sort_keys=True).encode(), digest_size=16).digest()
+    return hashlib.blake2b(msgspec.json.encode(what, order="sorted"), digest_size=16).digest()
 
 
 _mixes: dict[tuple[str, str], bytes] = {}

@@ -7,9 +7,9 @@ from itertools import islice
 
 from tilestamp.experiments.harness.pool import Pool, pool
 from tilestamp.experiments.studies.axes import shown
-from tilestamp.experiments.studies.cells import candidates, missing, rows
+from tilestamp.experiments.studies.cells import MOST_LISTED, candidates, missing, rows
 from tilestamp.experiments.studies.design import Design
-from tilestamp.experiments.studies.forecast import MOST_LISTED, Forecast, count, duration, forecast_of
+from tilestamp.experiments.studies.forecast import Forecast, count, duration, forecast_of
 from tilestamp.experiments.studies.forecast import forecast as forecast_study
 from tilestamp.experiments.studies.names import Names
 from tilestamp.experiments.studies.parameters import Resolver
@@ -57,20 +57,22 @@ class Summary:
         return said + [f"failed: {fault}" for fault in dict.fromkeys(self.faults)]
 
 
-def run_study(study: Design, jobs: int | None, cluster: str | None, say: Callable[[str], None]) -> Summary:
+def run_study(
+    study: Design, jobs: int | None, cluster: str | None, say: Callable[[str], None], resolver: Resolver
+) -> Summary:
     """Run what is not stored; see ``Study.run``."""
     begin = time.perf_counter()
-    resolver, summary = Resolver(), Summary(cells=len(study))
+    summary = Summary(cells=len(study))
     groups, expected = _first(study, resolver, jobs)
     summary.changed = _changed(study, resolver)
     if expected.todo or len(study.errors) > 1:
         with pool(jobs or expected.jobs, cluster) as workers:
-            runner = _Runner(study, workers, summary, say, expected.todo)
+            runner = _Runner(study, workers, summary, say, expected.todo, resolver)
             runner.run(groups)
             for error in study.errors[1:]:
-                wanted = may_be_best(study.best, candidates(study), error)
+                wanted = may_be_best(study.best, candidates(study, resolver), error)
                 runner.run(missing(study, resolver, error, wanted))
-                summary.coarse = sum(cell.is_wider(error) for cell in candidates(study))
+                summary.coarse = sum(cell.is_wider(error) for cell in candidates(study, resolver))
     summary.seconds = time.perf_counter() - begin
     return summary
 
@@ -78,7 +80,7 @@ def run_study(study: Design, jobs: int | None, cluster: str | None, say: Callabl
 def _first(study: Design, resolver: Resolver, jobs: int | None) -> tuple[Iterable[Group], Forecast]:
     """Groups of the first pass, and what is expected of them."""
     if len(study) > MOST_LISTED:
-        return missing(study, resolver, study.errors[0]), forecast_study(study, jobs)
+        return missing(study, resolver, study.errors[0]), forecast_study(study, resolver, jobs)
     groups = list(missing(study, resolver, study.errors[0]))
     return groups, forecast_of(study, groups, jobs)
 
@@ -95,12 +97,16 @@ def _changed(study: Design, resolver: Resolver) -> list[str]:
 class _Runner:
     """Hands groups to workers, and stores what comes back."""
 
-    def __init__(self, study: Design, workers: Pool, summary: Summary, say: Callable[[str], None], todo: int) -> None:
+    def __init__(
+        self, study: Design, workers: Pool, summary: Summary, say: Callable[[str], None], todo: int, resolver: Resolver
+    ) -> None:
         self.study, self.workers, self.summary, self.todo = study, workers, summary, todo
         self._say = say
         self._begin = self._said = time.perf_counter()
         self._executed = 0.0  # seconds
-        self._names = Names(study.record, study.pipelines, lambda: (stored.numbers for _, stored in rows(study)))
+        self._names = Names(
+            study.record, study.pipelines, lambda: (stored.numbers for _, stored in rows(study, resolver))
+        )
 
     def run(self, groups: Iterable[Group]) -> None:
         """Run some groups."""

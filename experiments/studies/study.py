@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tilestamp.experiments.studies import cells, forecast, runner
 from tilestamp.experiments.studies.axes import Choice
 from tilestamp.experiments.studies.design import Design
+from tilestamp.experiments.studies.parameters import Resolver
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -15,12 +16,16 @@ if TYPE_CHECKING:
 class Study(Design):
     """A design that can be run: see ``Design`` for its parameters."""
 
-    def forecast(self, jobs: int | None = None) -> forecast.Forecast:
-        """Say what a run would do: cells, executions, seconds."""
-        return forecast.forecast(self, jobs)
+    def forecast(self, jobs: int | None = None, resolver: Resolver | None = None) -> forecast.Forecast:
+        """Say what a run would do: cells, executions, seconds; see ``run``."""
+        return forecast.forecast(self, resolver or Resolver(), jobs)
 
     def run(
-        self, jobs: int | None = None, cluster: str | None = None, say: Callable[[str], None] = lambda _: None
+        self,
+        jobs: int | None = None,
+        cluster: str | None = None,
+        say: Callable[[str], None] = lambda _: None,
+        resolver: Resolver | None = None,
     ) -> runner.Summary:
         """Run what is not stored.
 
@@ -32,17 +37,20 @@ class Study(Design):
             ``local``, or a scheduler of dask.distributed, ``tcp://HOST:8786``.
         say : callable
             Told how far it is.
+        resolver : Resolver, optional
+            Of an earlier call of the same study: no cell is resolved twice. What it read (scenes, machines, sources)
+            is not read again.
 
         Raises
         ------
         TilestampError
             What is wrong with the study, the store or the workers; what was stored is safe.
         """
-        return runner.run_study(self, jobs, cluster, say)
+        return runner.run_study(self, jobs, cluster, say, resolver or Resolver())
 
-    def table(self) -> "pd.DataFrame":
-        """All cells of this study that are stored, in its order: a column an axis, a column a number."""
-        return cells.table(self)
+    def table(self, resolver: Resolver | None = None) -> "pd.DataFrame":
+        """All cells of this study that are stored, in its order: a column an axis, a column a number; see ``run``."""
+        return cells.table(self, resolver or Resolver())
 
     def at(self, points: Sequence[Mapping[str, Any]], jobs: int | None = 1) -> "pd.DataFrame":
         """Run cells that are no part of the axes, and give their rows, in order: for whoever searches, asks and tells.
@@ -55,5 +63,6 @@ class Study(Design):
         """
         asked = replace(self, grid={}, zip={}, sample=None, best="", store=self.kept)
         asked.__dict__["factors"] = [[Choice(dict(point), dict(point)) for point in points]]
-        asked.run(jobs)
-        return asked.table()
+        resolver = Resolver()
+        asked.run(jobs, resolver=resolver)
+        return asked.table(resolver)
