@@ -144,7 +144,7 @@ def _shown_error(run: Run) -> str:
         if was_measured(run.machine)
         else "published times of other machines"
     )
-    return f"expect {low:.4g} to {high:.4g} ms: so near were 95 % of the {there}"
+    return f"expect {low:.4g} to {high:.4g} ms: 95 % of the {there} were that near"
 
 
 def _shown_sample(run: Run) -> str:

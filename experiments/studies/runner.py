@@ -9,7 +9,7 @@ from tilestamp.experiments.harness.pool import Pool, pool
 from tilestamp.experiments.studies.axes import shown
 from tilestamp.experiments.studies.cells import candidates, missing, rows
 from tilestamp.experiments.studies.design import Design
-from tilestamp.experiments.studies.forecast import MOST_LISTED, Forecast, duration, forecast_of
+from tilestamp.experiments.studies.forecast import MOST_LISTED, Forecast, count, duration, forecast_of
 from tilestamp.experiments.studies.forecast import forecast as forecast_study
 from tilestamp.experiments.studies.names import Names
 from tilestamp.experiments.studies.parameters import Resolver
@@ -45,14 +45,15 @@ class Summary:
 
     def sentences(self) -> list[str]:
         """Say it."""
-        said = [f"{self.cells:,} cells: {self.new:,} run by {self.executions:,} executions in {duration(self.seconds)}"]
+        done = f"{self.new:,} run by {count(self.executions, 'execution')} in {duration(self.seconds)}"
+        said = [f"{count(self.cells, 'cell')}: {done}"]
         if self.saved_executions > 0:
             about = f", about {duration(self.saved_seconds)}" if self.saved_seconds else ""
-            said[0] += f"; repricing saved {self.saved_executions:,} executions{about}"
+            said[0] += f"; repricing saved {count(self.saved_executions, 'execution')}{about}"
         if self.coarse:
-            said.append(f"{self.coarse:,} cells cannot be the best, and were left coarse (column coarse)")
+            said.append(f"cannot be the best, and left coarse (column coarse): {count(self.coarse, 'cell')}")
         if self.problems:
-            said.append(f"{self.problems:,} cells have no time; the column problem says why")
+            said.append(f"without a time: {count(self.problems, 'cell')}; the column problem says why")
         return said + [f"failed: {fault}" for fault in dict.fromkeys(self.faults)]
 
 
@@ -146,7 +147,8 @@ class _Runner:
         times = outcome.executions, outcome.execution_seconds, len(outcome.results), outcome.pricing_seconds
         self.study.kept.note_times(execution.pipeline, execution.width * execution.height, *times)
         summary.executions += outcome.executions
-        summary.saved_executions += len(outcome.results) - outcome.executions
+        priced = sum(result.values is not None for result in outcome.results)
+        summary.saved_executions += max(0, priced - outcome.executions)
         self._executed += outcome.execution_seconds
         if summary.executions:
             summary.saved_seconds = summary.saved_executions * self._executed / summary.executions
