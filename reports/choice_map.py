@@ -88,4 +88,4 @@ def _legend(axes: "Axes", choices: list[Any], legend: str) -> None:
 
 
 def _text(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

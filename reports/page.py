@@ -5,20 +5,23 @@ from pathlib import Path
 from typing import Any
 
 TEMPLATE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{{ title }}</title>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width"><title>{{ title }}</title>
 <style>
  body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
  h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; border-top: 1px solid #ddd; padding-top: 1.2rem; }
- table { border-collapse: collapse; font-size: 13px; margin: .8rem 0; }
+ table { border-collapse: collapse; font-size: 13px; margin: .8rem 0; display: block; overflow-x: auto; }
  td, th { padding: .15rem .6rem; text-align: right; }
  th { border-bottom: 1px solid #999; }
  td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
  tr.fitted td { color: #888; font-style: italic; }
- td:nth-child(10) { text-align: left; font-size: 11px; max-width: 22rem; }
+ td:nth-child(n+3):nth-child(-n+9) { white-space: nowrap; }
+ td:nth-child(10), th:nth-child(10) { text-align: left; } td:nth-child(10) { font-size: 11px; min-width: 14rem; }
  tr.missed td.error { color: #b00020; font-weight: 600; }
  nav ul { margin: .2rem 0 .8rem; padding-left: 1.2rem; } nav p { margin: .2rem 0; } a { color: #1f5aa6; }
  img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
  table.overview td, table.overview th { text-align: left; vertical-align: top; border-bottom: 1px solid #eee; }
+ table.overview td { white-space: normal; min-width: 4rem; }
  footer { color: #777; font-size: 12px; margin-top: 3rem; }
 </style></head><body>
 <h1>{{ title }}</h1>

@@ -36,6 +36,14 @@ def test_json_has_stages_counts_and_milliseconds(capsys):
     assert answer["counts"]["tile_raster.GRIDS"] > 0
 
 
+def test_only_times_by_the_schedule_say_how_far_off_they_may_be(capsys):
+    said = []
+    for fidelity in ("schedule", "bounds"):
+        assert run_command(["render", "teapot", *SMALL, "--fidelity", fidelity]) == 0
+        said.append("expect " in capsys.readouterr().out)
+    assert said == [True, False]
+
+
 def test_a_what_if_changes_the_time_and_not_the_counts(capsys):
     answers = []
     for change in ([], ["--set", "sm.clock_mhz=2592.0"]):

@@ -256,3 +256,7 @@ def test_a_slip_in_a_study_that_is_asked_has_its_line(file, capsys):
 
 def test_the_runner_of_studies_is_no_experiment():
     assert "studies/runner" not in experiment_names()
+
+
+def test_labels_of_a_front_have_a_clock_in_full():
+    assert answers._short(1970.7) == "1971"

@@ -126,6 +126,8 @@ def test_what_a_machine_cannot_launch_is_said_in_its_row_and_the_others_go_on(ex
     summary = study.run(jobs=1)
     table = study.table()
     assert summary.problems == 1
+    assert (summary.executions, summary.saved_executions) == (1, 0)  # what cannot be launched saves nothing
+    assert summary.sentences()[0].startswith("2 cells: 2 run by 1 execution in ")
     assert table["milliseconds"].notna().tolist() == [True, False]
     assert "512 threads" in table["problem"][1]
     assert not study.forecast().todo  # it would be no other one

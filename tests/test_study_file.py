@@ -113,6 +113,7 @@ def test_a_dry_run_says_what_a_run_then_does_and_leaves_nothing(tmp_path, capsys
     printed = capsys.readouterr().out
     assert "4 cells: 4 run by 2 executions" in printed
     assert "repricing saved 2 executions" in printed
+    assert printed.splitlines()[2].startswith("a")  # no title: the file's name
     table = pd.read_csv(tmp_path / "a.csv")
     assert (
         table["milliseconds"].tolist()

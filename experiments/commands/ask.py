@@ -57,7 +57,7 @@ def best(
     check_png(output)
     with _study(file, store) as (asked, say):
         agree(len(asked), yes=False)
-        _show(answers.best(asked, axis, _names(over), number, jobs, say), file, output)
+        _show(answers.best(asked, axis, _names(over), number, jobs, say), asked.title, output)
 
 
 @ask.command
@@ -82,7 +82,7 @@ def front(
     check_png(output)
     with _study(file, store) as (asked, say):
         agree(len(asked), yes=False)
-        _show(answers.front(asked, one, other, jobs, say), file, output)
+        _show(answers.front(asked, one, other, jobs, say), asked.title, output)
 
 
 @ask.command
@@ -106,7 +106,7 @@ def screen(
     """
     check_png(output)
     with _study(file, store) as (asked, _):
-        _show(answers.screened(asked, number, walks), file, output)
+        _show(answers.screened(asked, number, walks), asked.title, output)
 
 
 @ask.command
@@ -130,7 +130,7 @@ def sobol(
     """
     check_png(output)
     with _study(file, store) as (asked, _):
-        _show(answers.shared(asked, number, points), file, output)
+        _show(answers.shared(asked, number, points), asked.title, output)
 
 
 @ask.command
@@ -157,7 +157,7 @@ def search(
     """
     check_png(output)
     with _study(file, store) as (asked, say):
-        _show(answers.searched(asked, _names(wanted), cells, seed, say), file, output)
+        _show(answers.searched(asked, _names(wanted), cells, seed, say), asked.title, output)
 
 
 @contextmanager
@@ -171,9 +171,9 @@ def _study(file: Path, store: Path | None) -> Iterator[tuple[Study, Progress]]:
         raise read.placed(error) from None
 
 
-def _show(answer: answers.Answer, file: Path, output: Path | None) -> None:
+def _show(answer: answers.Answer, title: str, output: Path | None) -> None:
     """Print an answer, and draw it."""
-    print_rows(answer.table, file.stem)
+    print_rows(answer.table, title)
     sys.stdout.writelines(f"- {sentence}\n" for sentence in answer.sentences)
     if output is not None:
         with writing(output):

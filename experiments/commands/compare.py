@@ -36,7 +36,7 @@ def compare(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> None:
-    """Compare runs stage by stage: times, shares, ratios, what holds, and the term that changed most.
+    """Compare runs stage by stage: times, shares, ratios, bounds, and how the term that bounds changed.
 
     What is given more than once is compared, in every combination: `--machine gtx280 --machine h200`,
     `-O tile=8 -O tile=16`, `--set sm.count=30 --set sm.count=60`, two scenes. All are compared with the first.

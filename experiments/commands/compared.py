@@ -87,7 +87,7 @@ def _compared(name: str, scene: str, about: str, stages: dict[str, dict[str, Any
 
 
 def print_comparison(runs: Sequence[Compared]) -> None:
-    """Print times, shares and ratios, then what holds each stage and the term that changed most."""
+    """Print times, shares and ratios, then the bound of each stage and how that term changed."""
     sys.stdout.writelines(f"{run.name}: {run.about}\n" for run in runs)
     first, *others = runs
     stages = [*dict.fromkeys(stage for run in runs for stage in run.times if stage != FRAME), FRAME]
@@ -100,9 +100,9 @@ def print_comparison(runs: Sequence[Compared]) -> None:
     rows = [_change(stage, first, run) for stage in stages[:-1] for run in others if _differs(stage, first, run)]
     if rows:
         sys.stdout.write("\n")
-        columns = ["stage", "run", "held by", "then", "term", "ms", "then ms", "ratio"]
+        columns = ["stage", "run", "bound", "then", "term", "ms", "then ms", "ratio"]
         print_table(
-            "What holds, and how that term changed; where it did not, the largest change",
+            "Bound of each stage, and how that term changed; where it did not, the largest change",
             columns,
             rows,
             keys=2,
@@ -126,7 +126,7 @@ def _differs(stage: str, first: Compared, run: Compared) -> bool:
 
 
 def _change(stage: str, first: Compared, run: Compared) -> list[str]:
-    """What holds a stage in two runs, and how that term changed; where it did not, the one that changed most."""
+    """The bound of a stage in two runs, and how that term changed; where it did not, the one that changed most."""
     before, after = first.terms[stage], run.terms[stage]
     row = [stage, run.name, first.bounds[stage], run.bounds[stage]]
     both = before.keys() & after.keys()
@@ -140,7 +140,7 @@ def _change(stage: str, first: Compared, run: Compared) -> list[str]:
 
 
 def write_plot(runs: Sequence[Compared], path: Path) -> None:
-    """Draw the times of the stages, a bar a run, with what holds at its end."""
+    """Draw the times of the stages, a bar a run, with its bound at the end."""
     import pandas as pd
 
     from tilestamp.reports.compare_plot import grouped_bars
@@ -150,7 +150,7 @@ def write_plot(runs: Sequence[Compared], path: Path) -> None:
         for run in runs
         for stage, time in run.times.items()
     ]
-    title = f"{', '.join(dict.fromkeys(run.scene for run in runs))}: milliseconds, and what holds"
+    title = f"{', '.join(dict.fromkeys(run.scene for run in runs))}: milliseconds, and the bound"
     columns = {"group": "stage", "bar": "run", "value": "milliseconds", "note": "bound"}
     with writing(path):
         grouped_bars(pd.DataFrame(rows), path, **columns, title=title, label="milliseconds")

@@ -71,7 +71,7 @@ def as_json(run: Run) -> dict[str, Any]:
         "fidelity": run.fidelity,
         "options": run.options,
         "milliseconds": run.milliseconds if run.counted else None,
-        "error_interval_milliseconds": _plain(run.error_interval) if run.counted else None,
+        "error_interval_milliseconds": _plain(run.error_interval) if _error_is_known(run) else None,
         **_sampling(run),
         "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
         "counters": {name: {"title": c.title, "kind": c.kind} for name, c in run.counters.items()},
@@ -136,7 +136,7 @@ def _shown_time(run: Run) -> str:
 
 def _shown_error(run: Run) -> str:
     """Say how far the frame's time may be from a real machine's."""
-    if not run.counted or run.milliseconds != run.milliseconds:
+    if not _error_is_known(run):
         return ""
     low, high = run.error_interval
     there = (
@@ -144,7 +144,12 @@ def _shown_error(run: Run) -> str:
         if was_measured(run.machine)
         else "published times of other machines"
     )
-    return f"expect {low:.4g} to {high:.4g} ms: so near were 95 % of the {there}"
+    return f"expect {low:.4g} to {high:.4g} ms: 95 % of the {there} were that near"
+
+
+def _error_is_known(run: Run) -> bool:
+    """Whether the frame has a time, by the schedule: the residuals are of such times."""
+    return run.counted and run.fidelity == "schedule" and run.milliseconds == run.milliseconds
 
 
 def _shown_sample(run: Run) -> str:

@@ -62,7 +62,7 @@ def study(
             agree(len(asked), yes=yes or dry_run)
             with progress("looking at the study"):
                 expected = asked.forecast(jobs, resolver)
-        sys.stdout.write(f"{asked.title or file.stem}: {expected.sentence()}\n")
+        sys.stdout.write(f"{asked.title}: {expected.sentence()}\n")
         sys.stdout.flush()
         if dry_run:
             return 0
@@ -73,7 +73,7 @@ def study(
     except StudyError as error:
         raise read.placed(error) from None
     sys.stdout.writelines(f"{sentence}\n" for sentence in (*summary.changed, *summary.sentences()))
-    print_rows(table, asked.title or file.stem)
+    print_rows(table, asked.title)
     if output is not None:
         export(table, output)
         sys.stdout.write(f"table: {output}\n")

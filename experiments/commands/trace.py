@@ -62,7 +62,7 @@ def _process(launch: LaunchTimeline) -> Process:
         for tid in np.unique(thread)
     }
     return Process(
-        name=f"{launch.stage}: {launch.kernel}, held by {launch.bound}",
+        name=f"{launch.stage}: {launch.kernel}, bound: {launch.bound}",
         parts=[part for part in _parts(launch) if part[2] > part[1]],
         threads=names,
         thread=thread,
@@ -82,7 +82,7 @@ def _parts(launch: LaunchTimeline) -> list[tuple[str, float, float]]:
     """What the time of a launch is made of, from its beginning to its end."""
     overhead = ("kernel overhead", launch.begin, launch.units_begin)
     if launch.units_end == launch.units_begin:
-        return [overhead, (f"not scheduled: held by {launch.bound}", launch.units_begin, launch.end)]
+        return [overhead, (f"not scheduled; bound: {launch.bound}", launch.units_begin, launch.end)]
     return [
         overhead,
         ("units on the SMs", launch.units_begin, launch.units_end),

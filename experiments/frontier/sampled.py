@@ -202,11 +202,11 @@ def _notes(table: "pd.DataFrame") -> list[str]:
             "Only the last stage is sampled, whose outputs nothing but the picture needs: sub-patches are split, diced "
             "and bucketed, triangles set up, binned and listed in full; and the launches are priced unit by unit."
         ),
-        f"Intervals of the four numbers of the frame that held the full run's value: {np.mean(inside):.0%}.",
+        f"Intervals of the four numbers of the frame that held the full run's value: {100 * np.mean(inside):.0f} %.",
         (
             f"Frames whose last stage takes less than about {PAYS:g} seconds run in full: a sample would cost more. "
-            "The dearest run beside the full one: "
-            f"{table.share_of_full.max():.2f} of it."
+            "The run that costs most takes "
+            f"{table.share_of_full.max():.2f} of the full one's time."
         ),
     ]
 

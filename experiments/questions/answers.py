@@ -72,13 +72,13 @@ def _shares(found: "pd.DataFrame", axis: str) -> str:
     told = ", ".join(f"{axis} {value} at {count}" for value, count in counts.items())
     close = int((found["margin"] < DOUBT).sum())
     return f"Best of {len(found)} places: {told}" + (
-        f"; at {close} the second best is within {DOUBT:.0%}" * bool(close)
+        f"; at {close} the second best is within {100 * DOUBT:.0f} %" * bool(close)
     )
 
 
 def _change(axis: str, along: str, one: Boundary) -> str:
     where = ", ".join(f"{name} {value}" for name, value in one.place.items())
-    return f"{where}{': ' * bool(where)}{axis} {one.before} up to {along} {one.at:.3g}, then {one.after}"
+    return f"{where}{': ' * bool(where)}{axis} {one.before} up to {along} {one.at:.4g}, then {one.after}"
 
 
 def front(study: Study, one: str, other: str, jobs: int | None = 1, say: Say = silent) -> Answer:
@@ -105,7 +105,7 @@ def _draw_front(table: "pd.DataFrame", axes: list[str], one: str, other: str, pa
 
 
 def _short(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def screened(study: Study, number: str = "milliseconds", walks: int = 8) -> Answer:
@@ -124,7 +124,7 @@ def screened(study: Study, number: str = "milliseconds", walks: int = 8) -> Answ
 def shared(study: Study, number: str = "milliseconds", points: int = 64) -> Answer:
     """What share of a number's variance each axis has: Sobol."""
     table = effects.sobol(study, number, points)
-    told = ", ".join(f"{row.axis} {max(row.total, 0.0):.0%}" for row in table.head(3).itertuples())
+    told = ", ".join(f"{row.axis} {100 * max(row.total, 0.0):.0f} %" for row in table.head(3).itertuples())
     sentence = f"Share of the variance of {number}, with all that an axis does together with others: {told}"
     draw = partial(
         effects_plot, table, value="total", inner="alone", x_label=f"share of the variance of {number}",

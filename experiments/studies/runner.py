@@ -45,8 +45,8 @@ class Summary:
 
     def sentences(self) -> list[str]:
         """Say it."""
-        executed = count(self.executions, "execution")
-        said = [f"{count(self.cells, 'cell')}: {self.new:,} run by {executed} in {duration(self.seconds)}"]
+        done = f"{self.new:,} run by {count(self.executions, 'execution')} in {duration(self.seconds)}"
+        said = [f"{count(self.cells, 'cell')}: {done}"]
         if self.saved_executions > 0:
             about = f", about {duration(self.saved_seconds)}" if self.saved_seconds else ""
             said[0] += f"; repricing saved {count(self.saved_executions, 'execution')}{about}"

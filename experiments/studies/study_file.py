@@ -59,7 +59,8 @@ class StudyFile:
         except msgspec.ValidationError as error:
             raise self.placed(_refused(error)) from None
         try:
-            study = Study(store=store, **msgspec.structs.asdict(file))
+            known = msgspec.structs.asdict(file) | {"title": file.title or self.path.stem}
+            study = Study(store=store, **known)
             _ = study.factors
         except StudyError as error:
             raise self.placed(error) from None
