@@ -1,0 +1,152 @@
+"""A design better than an H200 for CudaRaster at equal area proxy: what else the same area could be spent on.
+
+One number a step is made larger or smaller, the one that gains most, and L2 takes what area is left or gives what is
+missing. Clock, bandwidths and all else stay. The proxy and its weights: experiments/studies/area.py, all assumed.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tilestamp.experiments.frontier.methods_scenes import sheets
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.questions.space import values_at
+from tilestamp.experiments.studies.area import L2_MB, MEGABYTE, area
+from tilestamp.experiments.studies.study import Study
+from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
+from tilestamp.models.errors import TilestampError
+from tilestamp.models.machine import altered, load_machine
+from tilestamp.reports.frontier_plot import frontier
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+MACHINE = "h200"
+SIZE = (1280, 720)
+AREAS = {"small": 4.0, "middle": 32.0, "large": 512.0}  # pixels a triangle; designed on the middle one
+DESIGNED_ON = "middle"
+STEPS = 10
+GAIN = 0.002  # of a step that is worth taking
+SMALLEST_L2 = 4 * MEGABYTE
+MOVES = {  # factors of what the machine has
+    "sm.count": (0.8, 0.9, 1.1, 1.25),
+    "sm.schedulers": (0.5, 2.0),
+    "pipe.fp32": (0.5, 2.0),
+    "pipe.int32": (0.5, 2.0),
+    "pipe.sfu": (0.5, 2.0),
+    "sm.registers": (0.5, 2.0),
+    "sm.shared_bytes": (0.5, 0.75, 1.25),
+}
+Design = Mapping[str, float]
+
+
+def run(progress: Progress) -> Result:
+    """Take steps until none gains, then price the design on frames that it was not made for."""
+    import pandas as pd
+
+    steps = pd.DataFrame(descend(study_of(DESIGNED_ON), progress))
+    tried, taken = steps, steps[steps["taken"]]
+    last = taken.iloc[-1]
+    design = {name: last[name] for name in (*MOVES, "memory.l2_bytes")}
+    frames = {name: _gain(name, design) for name in AREAS}
+    cells = [reported("the design", name, "", value) for name, value in design.items()]
+    cells += [reported("time over that of an H200", f"{name} triangles", "", ratio) for name, ratio in frames.items()]
+    figure = Figure("steps", partial(_draw, tried))
+    title = f"A design better than an H200 for CudaRaster at equal area proxy, sheets of triangles, {SIZE[0]}x{SIZE[1]}"
+    warnings = [WHAT_IF, "the area proxy: all weights are assumed (experiments/studies/area.py)"]
+    return finding("better_than_h200", title, cells, [figure], notes(taken, frames), {"steps": tried}, warnings)
+
+
+def study_of(name: str) -> Study:
+    """CudaRaster on triangles of one size."""
+    fixed: dict[str, Any] = {"pipeline": "cudaraster", "machine": MACHINE, "size": f"{SIZE[0]}x{SIZE[1]}"}
+    return Study(title="better than an H200", fixed={**fixed, "scene": sheets(AREAS[name], *SIZE)})
+
+
+def descend(study: Study, progress: Progress) -> list[dict[str, Any]]:
+    """Take the best move of each step; a row for each design that was priced."""
+    base = load_machine(MACHINE)
+    here: Design = {name: base.number(name) for name in (*MOVES, "memory.l2_bytes")}
+    time = float(values_at(study, [here], ["milliseconds"])[0][0, 0])
+    rows = [{"step": 0, "move": "H200", "milliseconds": time, "area": area(base), "taken": True, **here}]
+    for step in range(1, STEPS + 1):
+        progress(f"studies_shipped/better_than_h200: step {step}, {time:.4f} ms")
+        moves = neighbours(here)
+        times = values_at(study, list(moves.values()), ["milliseconds"])[0][:, 0]
+        if np.isnan(times).all():
+            break
+        best = int(np.nanargmin(times))
+        worth = times[best] < time * (1.0 - GAIN)
+        for place, (move, design) in enumerate(moves.items()):
+            proxy = area(altered(base, design))
+            took = bool(worth and place == best)
+            rows.append(
+                {"step": step, "move": move, "milliseconds": times[place], "area": proxy, "taken": took, **design}
+            )
+        if not worth:
+            break
+        here, time = list(moves.values())[best], float(times[best])
+    return rows
+
+
+def neighbours(here: Design) -> dict[str, Design]:
+    """Designs one move away, of the H200's area: L2 makes up for the change. Those that cannot be are left out."""
+    base = load_machine(MACHINE)
+    found = {}
+    for name, factors in MOVES.items():
+        for factor in factors:
+            value = here[name] * factor
+            moved = {**here, name: round(value) if isinstance(base.number(name), int) else value}
+            try:
+                short = area(base) - area(altered(base, moved))
+                l2 = moved["memory.l2_bytes"] + short * MEGABYTE / L2_MB
+                moved["memory.l2_bytes"] = int(l2) // 1024 * 1024
+                altered(base, moved)
+            except TilestampError:  # no machine has these together
+                continue
+            if l2 >= SMALLEST_L2:
+                found[f"{name} x {factor:g}"] = moved
+    return found
+
+
+def _gain(name: str, design: Design) -> float:
+    """Time with the design over that of an H200, on one frame."""
+    times = values_at(study_of(name), [{}, design], ["milliseconds"])[0][:, 0]
+    return float(times[1] / times[0])
+
+
+def notes(taken: "pd.DataFrame", frames: Mapping[str, float]) -> list[str]:
+    """Say which steps were taken, what the design is, and whether it holds elsewhere."""
+    first, last = taken.iloc[0], taken.iloc[-1]
+    steps = ", then ".join(
+        f"{row.move} ({row.milliseconds / before - 1:+.1%})"
+        for row, before in zip(taken.iloc[1:].itertuples(), taken["milliseconds"], strict=False)
+    )
+    changed = ", ".join(f"{name} {first[name]:g} to {last[name]:g}" for name in (*MOVES, "memory.l2_bytes")
+                        if first[name] != last[name])  # fmt: skip
+    others = ", ".join(f"{ratio:.2f} on {name} triangles ({AREAS[name]:g} px)" for name, ratio in frames.items())
+    return [
+        f"Steps that gained, each the best of its neighbours: {steps or 'none: no neighbour is better'}.",
+        f"The design: {changed or 'an H200'}; its proxy is {last['area'] / first['area']:.3f} of an H200's.",
+        f"Its time over an H200's, designed on {DESIGNED_ON} triangles: {others}.",
+        "Clock, latencies, bandwidths of L2 and DRAM, atomic units and launch costs stay an H200's, whatever changes: assumed.",
+    ]
+
+
+def _draw(tried: "pd.DataFrame", path: "Path") -> None:
+    """Draw each design that was priced: L2 that is left against time."""
+    import pandas as pd
+
+    rows = tried.dropna(subset="milliseconds")
+    names = [f"{row.step}: {row.move}" if row.taken else "" for row in rows.itertuples()]
+    group = ["taken" if row.taken else "tried" for row in rows.itertuples()]
+    megabytes = rows["memory.l2_bytes"] / MEGABYTE
+    points = {"name": names, "group": group, "cost": megabytes, "error": rows["milliseconds"], "published": False}
+    frame = pd.DataFrame({**points, "front": [bool(flag) for flag in rows["taken"]]}).drop(columns="front")
+    title = "Designs of an H200's area: what is not SMs is L2"
+    frontier(path, frame, "L2 [MB]", "time of the frame [ms]", title)
