@@ -1,10 +1,13 @@
 """A design better than an H200 for CudaRaster at equal area proxy: what else the same area could be spent on.
 
-One number a step is made larger or smaller, the one that gains most, and L2 takes what area is left or gives what is
-missing. Clock, bandwidths and all else stay. The proxy and its weights: experiments/studies/area.py, all assumed.
+One number a step is made larger or smaller, the one that gains most, and L2 or more SMs take the area that it leaves,
+or give what is missing. Clock, bandwidths and all else stay. The proxy and its weights: experiments/studies/area.py, all
+assumed.
 """
 
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +17,12 @@ from tilestamp.experiments.frontier.methods_scenes import sheets
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.questions.space import values_at
-from tilestamp.experiments.studies.area import L2_MB, MEGABYTE, area
+from tilestamp.experiments.studies.area import L2_MB, MEGABYTE, area, sm_area
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.reports.frontier_plot import frontier
+from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,18 +33,19 @@ MACHINE = "h200"
 SIZE = (1280, 720)
 AREAS = {"small": 4.0, "middle": 32.0, "large": 512.0}  # pixels a triangle; designed on the middle one
 DESIGNED_ON = "middle"
-STEPS = 10
-GAIN = 0.002  # of a step that is worth taking
+STEPS = 6
+GAIN = 0.007  # of a step that is worth taking
 SMALLEST_L2 = 4 * MEGABYTE
 MOVES = {  # factors of what the machine has
-    "sm.count": (0.8, 0.9, 1.1, 1.25),
+    "sm.count": (0.9, 1.1),
     "sm.schedulers": (0.5, 2.0),
     "pipe.fp32": (0.5, 2.0),
     "pipe.int32": (0.5, 2.0),
     "pipe.sfu": (0.5, 2.0),
     "sm.registers": (0.5, 2.0),
-    "sm.shared_bytes": (0.5, 0.75, 1.25),
+    "sm.shared_bytes": (0.5, 1.25),
 }
+FILLERS = ("L2", "SMs")  # what makes up for the area of a change
 Design = Mapping[str, float]
 
 
@@ -95,23 +99,30 @@ def descend(study: Study, progress: Progress) -> list[dict[str, Any]]:
 
 
 def neighbours(here: Design) -> dict[str, Design]:
-    """Designs one move away, of the H200's area: L2 makes up for the change. Those that cannot be are left out."""
+    """Designs one move away, of an H200's area: L2 or SMs make up for it; what cannot be is left out."""
     base = load_machine(MACHINE)
     found = {}
     for name, factors in MOVES.items():
         for factor in factors:
             value = here[name] * factor
             moved = {**here, name: round(value) if isinstance(base.number(name), int) else value}
-            try:
-                short = area(base) - area(altered(base, moved))
-                l2 = moved["memory.l2_bytes"] + short * MEGABYTE / L2_MB
-                moved["memory.l2_bytes"] = int(l2) // 1024 * 1024
-                altered(base, moved)
-            except TilestampError:  # no machine has these together
-                continue
-            if l2 >= SMALLEST_L2:
-                found[f"{name} x {factor:g}"] = moved
+            for filler in FILLERS if name != "sm.count" else FILLERS[:1]:
+                with suppress(TilestampError):  # no machine has these together
+                    design = filled(moved, filler)
+                    if design["sm.count"] >= 1 and design["memory.l2_bytes"] >= SMALLEST_L2:
+                        altered(base, design)
+                        found[f"{name} x {factor:g}, {filler}"] = design
     return found
+
+
+def filled(design: Design, filler: str) -> Design:
+    """Spend on L2, or on SMs and the rest on L2, what a design is short of an H200's area."""
+    base = load_machine(MACHINE)
+    machine = altered(base, design)
+    short = area(base) - area(machine)
+    more = math.floor(short / sm_area(machine)) if filler == FILLERS[1] else 0
+    l2 = design["memory.l2_bytes"] + (short - more * sm_area(machine)) * MEGABYTE / L2_MB
+    return {**design, "sm.count": design["sm.count"] + more, "memory.l2_bytes": int(l2) // 1024 * 1024}
 
 
 def _gain(name: str, design: Design) -> float:
@@ -127,26 +138,22 @@ def notes(taken: "pd.DataFrame", frames: Mapping[str, float]) -> list[str]:
         f"{row.move} ({row.milliseconds / before - 1:+.1%})"
         for row, before in zip(taken.iloc[1:].itertuples(), taken["milliseconds"], strict=False)
     )
-    changed = ", ".join(f"{name} {first[name]:g} to {last[name]:g}" for name in (*MOVES, "memory.l2_bytes")
+    changed = ", ".join(f"{name} {first[name]:.6g} to {last[name]:.6g}" for name in (*MOVES, "memory.l2_bytes")
                         if first[name] != last[name])  # fmt: skip
     others = ", ".join(f"{ratio:.2f} on {name} triangles ({AREAS[name]:g} px)" for name, ratio in frames.items())
     return [
         f"Steps that gained, each the best of its neighbours: {steps or 'none: no neighbour is better'}.",
         f"The design: {changed or 'an H200'}; its proxy is {last['area'] / first['area']:.3f} of an H200's.",
         f"Its time over an H200's, designed on {DESIGNED_ON} triangles: {others}.",
-        "Clock, latencies, bandwidths of L2 and DRAM, atomic units and launch costs stay an H200's, whatever changes: assumed.",
+        "Clock, latencies, bandwidths, atomic units and launch costs stay an H200's, whatever changes: assumed.",
     ]
 
 
 def _draw(tried: "pd.DataFrame", path: "Path") -> None:
-    """Draw each design that was priced: L2 that is left against time."""
-    import pandas as pd
-
-    rows = tried.dropna(subset="milliseconds")
-    names = [f"{row.step}: {row.move}" if row.taken else "" for row in rows.itertuples()]
-    group = ["taken" if row.taken else "tried" for row in rows.itertuples()]
-    megabytes = rows["memory.l2_bytes"] / MEGABYTE
-    points = {"name": names, "group": group, "cost": megabytes, "error": rows["milliseconds"], "published": False}
-    frame = pd.DataFrame({**points, "front": [bool(flag) for flag in rows["taken"]]}).drop(columns="front")
-    title = "Designs of an H200's area: what is not SMs is L2"
-    frontier(path, frame, "L2 [MB]", "time of the frame [ms]", title)
+    """Draw what was taken and the best that was not, by step."""
+    tidy = tried.dropna(subset="milliseconds").groupby(["step", "taken"])["milliseconds"].min().reset_index()
+    tidy["what"] = tidy["taken"].map({True: "taken", False: "best of those not taken"})
+    lines(
+        tidy, path, x="step", y="milliseconds", by="what", title="Steps away from an H200, at its area",
+        x_label="step", y_label="time of the frame [ms]",
+    )  # fmt: skip

@@ -1,7 +1,7 @@
 """What the GTX 280 lacked: which of its numbers, changed alone, would have made another tile size the best.
 
-Every number of the machine is multiplied by factors from 1/64 to 64, all else as it was. The frame is that of Eisenacher &
-Loop 2010: the killeroo at 1600x1200, for which the paper chose tiles of 8x8.
+Every number of the machine is multiplied by factors from 1/64 to 64, all else as it was. The frame is that of
+Eisenacher & Loop 2010: the killeroo at 1600x1200, for which the paper chose tiles of 8x8.
 """
 
 from contextlib import suppress

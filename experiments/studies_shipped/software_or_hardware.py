@@ -56,8 +56,8 @@ def notes(ratios: "pd.DataFrame", crossings: list[Boundary]) -> list[str]:
     """Say where they cross on each machine, and how far apart they are at both ends."""
     return [
         *(_machine(str(machine), rows, crossings) for machine, rows in ratios.groupby("machine", sort=False)),
-        "Rates of the fixed-function pipe are assumed on most machines, and the mix of CudaRaster is fitted on a GTX 480 and "
-        "an H200: `tilestamp list machines` and the machine files say which number is what.",
+        _closest(ratios),
+        "Most rates of the fixed-function pipes are assumed: the machine files say which.",
     ]
 
 
@@ -68,6 +68,14 @@ def _machine(machine: str, rows: "pd.DataFrame", crossings: list[Boundary]) -> s
     where = "; ".join(f"{one.before} is faster up to {one.at:.3g} pixels a triangle, then {one.after}" for one in mine)
     always = SOFTWARE if ends["ratio"].iloc[0] < 1 else HARDWARE
     return f"{machine}: {where or f'{always} is faster at every size'} (software takes {told} what hardware takes)."
+
+
+def _closest(ratios: "pd.DataFrame") -> str:
+    row = ratios.loc[ratios["ratio"].idxmin()]
+    return (
+        f"Software comes closest on {row['machine']} at {row['area']:g} px: fixed function at"
+        f" {1 / row['ratio']:.2g} of its rates would be as fast."
+    )
 
 
 def _draw(ratios: "pd.DataFrame", path: "Path") -> None:
