@@ -1,8 +1,8 @@
 """Atomics against sort as conflicts grow: FreePipe and CudaRaster draw the same triangles in more and more layers.
 
-FreePipe has an atomic for each fragment, on the frame buffer, or only for those that are nearer than what it reads there
-first. CudaRaster sorts triangles to tiles, in which each pixel has one owner. As many triangles of one size lie at random
-in squares of fewer and fewer pixels.
+FreePipe has an atomic for each fragment, on the frame buffer, or only for those that are nearer than what it reads
+there first. CudaRaster sorts triangles to tiles, in which each pixel has one owner. As many triangles of one size lie
+at random in squares of fewer and fewer pixels.
 """
 
 from functools import partial

@@ -1,8 +1,7 @@
 """A design better than an H200 for CudaRaster at equal area proxy: what else the same area could be spent on.
 
 One number a step is made larger or smaller, the one that gains most, and L2 or more SMs take the area that it leaves,
-or give what is missing. Clock, bandwidths and all else stay. The proxy and its weights: experiments/studies/area.py, all
-assumed.
+or give what is missing. Clock, bandwidths and all else stay. The proxy: experiments/studies/area.py, all assumed.
 """
 
 import math

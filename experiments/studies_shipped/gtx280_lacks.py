@@ -43,11 +43,13 @@ def run(progress: Progress) -> Result:
     table = pd.concat(parts, ignore_index=True).dropna()
     usual = int(best_values(table[table["factor"] == 1], "tile", ["number"])["best"].iloc[0])
     needed = nearest(boundaries(table, "tile", "factor", ["number"], "milliseconds"), usual)
-    cells = [reported(number, f"factor for {tile}x{tile}", "", at) for (number, tile), at in needed.items()]
+    now = table[(table["factor"] == 1) & (table["number"] == table["number"].iloc[0])]
+    cells = [reported("as it was", f"{row.tile}x{row.tile} tiles", "ms", row.milliseconds) for row in now.itertuples()]
+    cells += [reported(number, f"factor for {tile}x{tile}", "", at) for (number, tile), at in needed.items()]
     others = [tile for tile in TILES if tile != usual]
     figures = [Figure(f"tiles-of-{tile}", partial(_draw, table, needed, usual, tile)) for tile in others]
     title = "What the GTX 280 lacked: which number, changed alone, makes another tile the best, killeroo, 1600x1200"
-    notes = [_usual(table, usual), *(_sentence(needed, usual, tile) for tile in others)]
+    notes = [_usual(now, table["number"].nunique(), usual), *(_sentence(needed, usual, tile) for tile in others)]
     warnings = [WHAT_IF, *stand_in_warnings("killeroo")]
     return finding("gtx280_lacks", title, cells, figures, notes, {"scan": table}, warnings)
 
@@ -79,10 +81,9 @@ def nearest(changes: list[Boundary], usual: int) -> dict[tuple[str, int], float]
     return found
 
 
-def _usual(table: "pd.DataFrame", usual: int) -> str:
-    one = table[(table["factor"] == 1) & (table["number"] == table["number"].iloc[0])]
-    told = ", ".join(f"{row.milliseconds:.1f} ms with {row.tile}x{row.tile}" for row in one.itertuples())
-    return f"As it was, {usual}x{usual} is the fastest: {told}; {table['number'].nunique()} numbers were scanned."
+def _usual(now: "pd.DataFrame", scanned: int, usual: int) -> str:
+    told = ", ".join(f"{row.milliseconds:.1f} ms with {row.tile}x{row.tile}" for row in now.itertuples())
+    return f"As it was, {usual}x{usual} is the fastest: {told}; {scanned} numbers were scanned."
 
 
 def _sentence(needed: dict[tuple[str, int], float], usual: int, tile: int) -> str:

@@ -1,6 +1,6 @@
 """Tile size against zoom and bound, on all machines: which tile of the micropolygon pipeline is the fastest where."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -19,7 +19,7 @@ FIXED = {"scene": "teapot", "size": "640x480", "bound_rule": "pixel_extent"}
 
 def run(progress: Progress) -> Result:
     """Price three tiles at four zooms and two bounds, on every machine there is."""
-    grid = {"tile": TILES, "bound": BOUNDS, "zoom": ZOOM, "machine": list(list_machines())}
+    grid: dict[str, Any] = {"tile": TILES, "bound": BOUNDS, "zoom": ZOOM, "machine": list(list_machines())}
     study = Study(title="tile size", fixed=FIXED, grid=grid)
     table = table_of(study, progress)
     found = answers.best(study, "tile", ["zoom", "machine"])
