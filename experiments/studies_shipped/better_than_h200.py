@@ -21,7 +21,7 @@ from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.reports.plots import lines
+from tilestamp.reports.tornado import tornado
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,7 +76,7 @@ def descend(study: Study, progress: Progress) -> list[dict[str, Any]]:
     base = load_machine(MACHINE)
     here: Design = {name: base.number(name) for name in (*MOVES, "memory.l2_bytes")}
     time = float(values_at(study, [here], ["milliseconds"])[0][0, 0])
-    rows = [{"step": 0, "move": "H200", "milliseconds": time, "area": area(base), "taken": True, **here}]
+    rows = [{"step": 0, "move": "H200", "milliseconds": time, "gain": 1.0, "area": area(base), "taken": True, **here}]
     for step in range(1, STEPS + 1):
         progress(f"studies_shipped/better_than_h200: step {step}, {time:.4f} ms")
         moves = neighbours(here)
@@ -89,7 +89,15 @@ def descend(study: Study, progress: Progress) -> list[dict[str, Any]]:
             proxy = area(altered(base, design))
             took = bool(worth and place == best)
             rows.append(
-                {"step": step, "move": move, "milliseconds": times[place], "area": proxy, "taken": took, **design}
+                {
+                    "step": step,
+                    "move": move,
+                    "milliseconds": times[place],
+                    "gain": times[place] / time,
+                    "area": proxy,
+                    "taken": took,
+                    **design,
+                }
             )
         if not worth:
             break
@@ -149,10 +157,20 @@ def notes(taken: "pd.DataFrame", frames: Mapping[str, float]) -> list[str]:
 
 
 def _draw(tried: "pd.DataFrame", path: "Path") -> None:
-    """Draw what was taken and the best that was not, by step."""
-    tidy = tried.dropna(subset="milliseconds").groupby(["step", "taken"])["milliseconds"].min().reset_index()
-    tidy["what"] = tidy["taken"].map({True: "taken", False: "best of those not taken"})
-    lines(
-        tidy, path, x="step", y="milliseconds", by="what", title="Steps away from an H200, at its area",
-        x_label="step", y_label="time of the frame [ms]",
-    )  # fmt: skip
+    """Draw what each move would do to the time, at each step."""
+    import pandas as pd
+
+    rows = []
+    for step, moves in tried[tried["step"] > 0].groupby("step"):
+        for name, factors in MOVES.items():
+            times = {factor: _least(moves, name, factor) for factor in factors}
+            lower, higher = (next((f for f in factors if (f < 1) == less), 1.0) for less in (True, False))
+            row = {"less": times.get(lower, math.nan), "more": times.get(higher, math.nan)}
+            rows.append({"step": f"step {step}", "number": name, "lower": lower, "value": 1.0, "higher": higher, **row})
+    title = "What each move would do to the time, at an H200's area (factors of a number)"
+    tornado(pd.DataFrame(rows), path, panel="step", label="number", title=title, least=0.0)
+
+
+def _least(moves: "pd.DataFrame", name: str, factor: float) -> float:
+    """Least time of a move over that before it, whatever makes up for the area; NaN where it cannot be made."""
+    return float(moves.loc[moves["move"].str.startswith(f"{name} x {factor:g},"), "gain"].min())
