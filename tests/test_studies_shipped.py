@@ -142,6 +142,7 @@ def test_all_neighbours_have_the_area_of_an_h200():
     assert areas == pytest.approx([area(base)] * len(areas), abs=L2_MB / 1000)
     assert found["pipe.fp32 x 2, SMs"]["sm.count"] > 132 == found["pipe.fp32 x 2, L2"]["sm.count"]
     assert found["pipe.fp32 x 2, L2"]["memory.l2_bytes"] > here["memory.l2_bytes"]
+    assert found["pipe.fp32 x 2, SMs"]["memory.l2_bytes"] >= here["memory.l2_bytes"]  # what no SM fits in is L2
     assert "sm.count x 1.1, L2" not in found  # no L2 would be left
 
 
