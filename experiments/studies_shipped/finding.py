@@ -1,0 +1,41 @@
+"""What all shipped studies say, and how: numbers and sentences are computed from the run, none is typed."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from tilestamp.experiments.harness.registry import Progress
+from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.studies.study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SOURCE = "tilestamp's own runs: nothing published stands beside these numbers"
+WHAT_IF = "what-if: machines with changed numbers do not exist, and their numbers are assumed"
+
+
+def table_of(study: Study, progress: Progress) -> "pd.DataFrame":
+    """Run a study in this process; its table."""
+    study.run(jobs=1, say=lambda how_far: progress(f"{study.title}: {how_far}"))
+    return study.table()
+
+
+def finding(
+    name: str,
+    title: str,
+    cells: Sequence[Cell],
+    figures: Sequence[Figure],
+    notes: Sequence[str],
+    tables: Mapping[str, "pd.DataFrame"],
+    warnings: Sequence[str] = (),
+) -> Result:
+    """Make the result of a shipped study."""
+    return Result(
+        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), figures=list(figures),
+        notes=list(notes), warnings=list(warnings), tables=dict(tables),
+    )  # fmt: skip
+
+
+def reported(row: str, column: str, unit: str, ours: float | str) -> Cell:
+    """A cell beside which nothing is published."""
+    return Cell(row, column, unit, published=None, ours=ours, status="reported")
