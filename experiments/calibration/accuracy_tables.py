@@ -48,7 +48,7 @@ def read_results(results: Path) -> "pd.DataFrame":
     -------
     DataFrame
         The columns of the experiments' tables ``all`` and: ``experiment``; ``family``; ``label``, the kernel's name
-        (memsets together, samples apart); ``seen``.
+        (memsets together, samples apart); ``seen``; ``config``, if only "".
     """
     import pandas as pd
 
@@ -75,7 +75,8 @@ def _read(path: Path, targets: Sequence[str]) -> "pd.DataFrame":
     families = [family(experiment, kernel) for kernel in table.kernel]
     samples = table.spp if "spp" in table else [0] * len(table)
     labels = [label(kernel, spp) for kernel, spp in zip(table.kernel, samples, strict=True)]
-    return table.assign(experiment=experiment, family=families, label=labels, seen=frames.map(seen))
+    config = table.get("config", "")
+    return table.assign(experiment=experiment, family=families, label=labels, seen=frames.map(seen), config=config)
 
 
 def family(experiment: str, kernel: str) -> str:
@@ -126,29 +127,23 @@ def choices(table: "pd.DataFrame") -> dict[str, list[tuple[str, str]]]:
     """Of each choice the pairs of what is the fastest, measured and ours, where the measured runner-up is not close."""
     times, frames = table[table.quantity == TIME], table[table.quantity == FRAME_TIME]
     tiles = times[times.kernel == "k_raster"]
-    ru = frames[frames.experiment == "silicon-textured_ru"]
-    tiled = ru[ru.config.str.fullmatch(r"tiled_t\d+_(cull|nocull)_(original|roomy)")] if len(ru) else ru
-    whole = (
-        ru[ru.config.str.fullmatch(r"(tiled_t\d+|per_primitive)_(cull|nocull)(_original|_roomy)?")] if len(ru) else ru
-    )
-    spans = table[table.quantity == SPAN]
-    spans = spans[spans.config.isin(["stream", "graph"])] if len(spans) else spans
+    spans = table[(table.quantity == SPAN) & table.config.isin(["stream", "graph"])]
     return {
         "tile size of the micropolygon raster": _fastest(tiles, ["experiment", "scene", "spp"], tiles.tile.astype(int)),
         "CudaRaster or FreePipe": _systems(times[times.family.isin(["CudaRaster", "FreePipe"])]),
-        "tile size of Ru 2016's frames": _fastest(
-            tiled.assign(culling=_part(tiled, "cull|nocull")), ["scene", "culling"], _part(tiled, r"tiled_t\d+")
+        "tile size of Ru 2016's frames": _ways(frames, r"(tiled_t\d+)_(cull|nocull)_(?:original|roomy)"),
+        "Ru 2016's tiles or a thread a triangle": _ways(
+            frames, r"(tiled|per_primitive)(?:_t\d+)?_(cull|nocull)(?:_original|_roomy)?"
         ),
-        "Ru 2016's tiles or a thread a triangle": _fastest(
-            whole.assign(culling=_part(whole, "cull|nocull")), ["scene", "culling"], _part(whole, "tiled|per_primitive")
-        ),
-        "Zhang 2025's stream or graph": _fastest(spans, ["scene"], spans.config if len(spans) else []),
-    }  # fmt: skip
+        "Zhang 2025's stream or graph": _fastest(spans, ["scene"], spans.config),
+    }
 
 
-def _part(rows: "pd.DataFrame", pattern: str) -> list[str]:
-    """The part of each configuration's name that says what was chosen."""
-    return [match[1] for name in rows.get("config", ()) if (match := re.search(rf"(?:^|_)({pattern})(?:_|$)", name))]
+def _ways(frames: "pd.DataFrame", pattern: str) -> list[tuple[str, str]]:
+    """The fastest of the ways (first part of the pattern) to draw a scene with one sort of culling (second part)."""
+    found = frames.config.str.extract(rf"^{pattern}$").dropna()
+    rows = frames.loc[found.index].assign(culling=found[1])
+    return _fastest(rows, ["scene", "culling"], found[0])
 
 
 def _systems(times: "pd.DataFrame") -> list[tuple[str, str]]:
