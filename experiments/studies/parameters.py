@@ -17,7 +17,6 @@ from tilestamp.experiments.studies.values import (
     SHARED,
     changed_number,
     is_priced,
-    number_of,
     option,
     pixels,
 )
@@ -129,7 +128,7 @@ class Resolver:
                     if key in changes:
                         raise TilestampError(f"{key} is changed twice")
                     changes[key] = number
-        changes = {key: value for key, value in changes.items() if value != number_of(machine, key)}
+        changes = {key: value for key, value in changes.items() if value != machine.number(key)}
         shape = self._shape(machine, changes)
         shapes = shape and shape._replace(sms=0), shape
         what = [machine.digest, sorted(changes.items()), given["fidelity"]]

@@ -29,14 +29,6 @@ def is_priced(name: str) -> bool:
     return name in PRICED or "." in name
 
 
-def number_of(machine: Machine, key: str) -> Any:
-    """Number of a machine by its name: ``sm.count``."""
-    part: Any = machine
-    for step in key.split("."):
-        part = part[step] if isinstance(part, dict) else getattr(part, step)
-    return part
-
-
 def is_whole(name: str, pipelines: Iterable[str]) -> bool:
     """Whether a parameter is a whole number."""
     if "." in name:
@@ -73,7 +65,7 @@ def changed_number(machine: Machine, name: str, value: object) -> tuple[str, Any
         raise TilestampError(f"{machine.name} has no number {key}{did_you_mean(key, known)}")
     value = plain_number(value)
     if name.startswith(TIMES):
-        value = _multiplied(number_of(machine, key), value, whole=is_whole(key, []))
+        value = _multiplied(machine.number(key), value, whole=is_whole(key, []))
     if isinstance(value, float) and value.is_integer() and is_whole(key, []):
         value = int(value)
     try:
