@@ -11,6 +11,7 @@ from tilestamp.experiments.questions import effects
 from tilestamp.experiments.questions.best import Boundary, are_numbers, best_values, boundaries, check_axes
 from tilestamp.experiments.questions.search import search
 from tilestamp.experiments.questions.space import numbers, recording
+from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.study import Study
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.choice_map import choice_map
@@ -161,8 +162,8 @@ def _draw_search(table: "pd.DataFrame", wanted: list[str], path: Path) -> None:
 
 def _run(study: Study, names: Sequence[str], jobs: int | None, say: Say) -> "pd.DataFrame":
     """Run what is missing of a study; give its table, with the numbers that the question needs."""
-    asked = recording(study, names)
-    faults = asked.run(jobs, say=say).faults
+    asked, resolver = recording(study, names), Resolver()
+    faults = asked.run(jobs, say=say, resolver=resolver).faults
     if faults:
         raise TilestampError(f"cells failed: {faults[0]}")
-    return asked.table()
+    return asked.table(resolver)
