@@ -3,9 +3,11 @@
 import logging
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
+from joblib import delayed
 
 from tilestamp import Study, TilestampError
 from tilestamp.experiments.harness import pool as pools
@@ -101,3 +103,10 @@ def test_without_dask_the_sentence_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(TilestampError, match=r"pip install 'tilestamp\[cluster\]'"):
         study().run(cluster="local")
+
+
+def test_a_run_that_ends_early_leaves_no_warning_of_joblib(recwarn):
+    results = pools.unordered((delayed(time.sleep)(seconds) for seconds in (0.0, 2.0, 2.0, 2.0)), 2)
+    next(results)
+    results.close()
+    assert not [warning for warning in recwarn if "tasks" in str(warning.message)]

@@ -4,6 +4,7 @@ A worker that dies takes no task with it: what it had is given to another one.
 """
 
 import signal
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 RETRIES = 3  # deaths of workers in a row, between which no task ended
+LEFT = "[0-9]+ tasks which were still being processed"  # joblib's warning where a run ends early: we say why
 IDLE = 20.0  # seconds after which a process without work ends: those of a parent that was killed, too
 
 
@@ -25,6 +27,7 @@ def unordered(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
     """Results of joblib's delayed calls as they come, from workers that do not hear Ctrl-C: we end them."""
     from joblib import Parallel
 
+    warnings.filterwarnings("ignore", LEFT, UserWarning)
     resource_tracker.ensure_running()  # or joblib starts it in what follows, and it lets signals through
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
