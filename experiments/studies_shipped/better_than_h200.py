@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+SLOW = True  # runs when it is named: tilestamp reproduce studies
 MACHINE = "h200"
 SIZE = (1280, 720)
 AREAS = {"small": 4.0, "middle": 32.0, "large": 512.0}  # pixels a triangle; designed on the middle one
