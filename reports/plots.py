@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 HATCHES = {"partly fitted": "//", "fitted": "//////"}  # of bars, by status
+MOST_INSIDE = 4  # series whose legend stands inside the axes; that of more would hide lines
 
 
 def lines(
@@ -49,7 +50,10 @@ def lines(
         axes.set_yscale("log" if log_y else "linear")
         if not log_y:
             axes.set_ylim(bottom=0)
-        axes.legend()
+        if len(axes.get_legend_handles_labels()[0]) > MOST_INSIDE:
+            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        else:
+            axes.legend()
 
 
 def paired_bars(

@@ -37,7 +37,7 @@ def tornado(table: "pd.DataFrame", path: Path, *, panel: str, label: str, title:
             _panel(axes, shown[name], str(name), label, places)
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
-        grid.flat[0].legend(fontsize=8, loc="lower left")
+        grid.flat[0].legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
 
 
 def _largest(rows: "pd.DataFrame", least: float) -> "pd.DataFrame":
