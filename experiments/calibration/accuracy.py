@@ -72,8 +72,8 @@ def page(results: Path) -> str:
 
 def _head(results: Path, times: "pd.DataFrame") -> Iterator[str]:
     unseen, (mean, worst) = times[~times.seen], TIME_AIM
-    labels = [(rows.label.iloc[0], errors(rows).mean) for _, rows in times.groupby(["family", "label"])]
-    over = [f"{name} {_percent(of)} %" for name, of in labels if of > KERNEL_AIM]
+    means = {place: errors(rows).mean for place, rows in times.groupby(["family", "label"])}
+    over = [f"{name} of {system} {_percent(of)} %" for (system, name), of in means.items() if of > KERNEL_AIM]
     yield f"""\
 {MARKER}
 # How accurate the predictions are
