@@ -86,7 +86,7 @@ with both in sight: no number was fitted to an unseen scene, but it is not blind
 ![Predicted against measured times of {len(times)} launches, both logarithmic, a colour a system, filled points for \
 the {len(unseen)} of unseen scenes: mean error {_percent(errors(times).mean)} %](../{PLOT})
 
-| launches over 5 us | number | mean (aim {_percent(mean)} %) | worst (aim {_percent(worst)} %) | within that |
+| over 5 us | number | mean (aim {_percent(mean)} %) | worst (aim {_percent(worst)} %) | within {_percent(worst)} % |
 | --- | --- | --- | --- | --- |"""
     for name, rows in (("all", times), ("of seen scenes", times[times.seen]), ("of unseen scenes", unseen)):
         found = errors(rows)
