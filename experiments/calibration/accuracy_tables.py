@@ -117,8 +117,8 @@ def covered(times: "pd.DataFrame") -> Iterator[tuple[str, int, float]]:
 
 def by_bound(times: "pd.DataFrame", *columns: str) -> list[tuple[tuple[str, ...], Errors, float]]:
     """Errors by the term that holds (and more columns), and the share of all error; the largest share first."""
-    whole = times.error.abs().sum()
-    groups = times.groupby([*columns, "bound"])
+    known = times.dropna(subset="bound")
+    whole, groups = known.error.abs().sum(), known.groupby([*columns, "bound"])
     found = [(name, errors(rows), rows.error.abs().sum() / whole) for name, rows in groups]
     return sorted(found, key=lambda group: -group[2])
 
