@@ -109,4 +109,5 @@ def bucket_write(boxes, idx, start, tile, columns, rows, slots, simt):
                 tally.load([4 * t if t >= 0 else -1 for t in wanted], 4, simt)
                 places = [4 * (start[t] + idx[p][slot]) if t >= 0 else -1 for p, t in zip(warp, wanted, strict=True)]
                 store(tally, places, 4, simt)
+                tally["STORE_LINES"] += len({place // 128 for place in places if place >= 0})
     return tally

@@ -189,7 +189,9 @@ def test_pricing_by_itself_counts_as_use_of_the_mix_and_of_the_machine():
     run = simulate(triangle(), "freepipe", "gtx480", **SMALL)
     with collect() as found:
         price(run.launches, run.machine)
-    assert {kind: list(names) for kind, names in found.items()} == {"mixes": ["freepipe/cc2"], "machines": ["gtx480"]}
+    names = {kind: list(used) for kind, used in found.items()}
+    assert (names["mixes"], names["machines"]) == (["freepipe/cc2"], ["gtx480"])
+    assert "freepipe/cc2: freepipe.SETUP_STEPS.fp32" in names["fitted numbers"]
 
 
 def test_a_frame_that_was_remembered_counts_as_used_again():

@@ -136,9 +136,9 @@ def test_padding_does_not_help_one_counter_but_one_atomic_a_warp_does(machine):
     assert merged < 0.1 * plain
 
 
-def test_cudaraster_overtakes_freepipe_at_one_triangle_of_1400_pixels():
+def test_cudaraster_overtakes_freepipe_at_one_triangle_of_860_pixels():
     small, large = (
-        [huge_triangle.milliseconds(p, area) for p in ("freepipe", "cudaraster")] for area in (1200.0, 1700.0)
+        [huge_triangle.milliseconds(p, area) for p in ("freepipe", "cudaraster")] for area in (800.0, 920.0)
     )
     assert small[0] < small[1]
     assert large[0] > large[1]
