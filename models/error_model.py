@@ -1,10 +1,10 @@
 """How far a predicted time may be from what a GPU takes: a factor by the term that holds, from residuals.
 
 ``residuals.toml`` is written by ``experiments/calibration/residuals.py`` from all kernel times measured on one H200,
-and, for machines on which no kernel was ever measured, from the published times of whole frames that nothing was fitted to. A factor
-is a conformal quantile: the ``ceil((n + 1) * 0.95)``-th smallest of n ratios of the larger to the smaller of measured
-and modelled, so 95 % of further times of the same kind lie within it, whatever their distribution. Terms with too few
-times to have one take that of all together.
+and, for machines on which no kernel was ever measured, from the published times of whole frames that nothing was fitted
+to. A factor is a conformal quantile: the ``ceil((n + 1) * 0.95)``-th smallest of n ratios of the larger to the smaller
+of measured and modelled, so 95 % of further times of the same kind lie within it, whatever their distribution. Terms
+with too few times to have one take that of all together.
 
 Launches of one frame are taken to err together: the interval of a sum is the sum of the intervals.
 """
