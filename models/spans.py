@@ -84,7 +84,7 @@ def _sooner(units: Loads) -> tuple[NDArray[np.float64], NDArray[np.float64], NDA
     choices = []
     for alone, places in ((crowd(units)[0], units.places), (units.alone, units.sms)):
         out = np.zeros(len(alone)), np.zeros(len(alone)), np.zeros(len(alone), np.int64)
-        _record(units.sm, alone, units.draws, places, units.sms, units.interval, units.start, *out)
+        _record(units.sm, alone, units.draws, units.moves, places, units.sms, units.interval, units.start, *out)
         choices.append((*out, places))
     return min(choices, key=lambda choice: float(choice[1].max(initial=0.0)))
 
@@ -94,6 +94,7 @@ def _record(
     sm: Any,
     alone: Any,
     draws: Any,
+    moves: Any,
     places: int,
     sms: int,
     interval: float,
@@ -106,7 +107,7 @@ def _record(
     units = len(alone)
     free, free_who = tournament(places if units > places else 1)
     served, served_who = tournament(min(sms, units))
-    drawn, begun = 0.0, -interval
+    drawn, moved, begun = 0.0, 0.0, -interval
     for i in range(units):
         begun += interval
         where[i] = i
@@ -120,6 +121,9 @@ def _record(
         if len(draws) > 0:
             drawn = max(drawn, begun) + draws[i]
             begin = drawn
+        if len(moves) > 0:
+            moved = max(moved, begun + start) + moves[i]
+            done = max(done, moved)
         ends[i] = max(done, begin + alone[i])
         if units > places:
             replay(free, free_who, ends[i])

@@ -12,6 +12,7 @@ from tests.pricing import schedule
 from tests.test_schedule import GTX280, H200, NOTHING, launch
 from tests.test_time_properties import MACHINES, launches
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.launch import Stream
 from tilestamp.models.price import opened
 from tilestamp.models.schedule import crowd, play
 from tilestamp.models.spans import OWN, spans
@@ -22,7 +23,7 @@ ROUNDING = 1e-6
 
 def naive(units, alone, places):
     """Start and end of each unit: heaps of places and SMs, the soonest taken each time."""
-    free, served, drawn, found, begun = [0.0] * places, [0.0] * units.sms, 0.0, [], -units.interval
+    free, served, drawn, moved, found, begun = [0.0] * places, [0.0] * units.sms, 0.0, 0.0, [], -units.interval
     for i, sm in enumerate(units.sm):
         begun = max(free[0], begun + units.interval)
         done = max(served[0], begun + units.start) + sm
@@ -30,6 +31,9 @@ def naive(units, alone, places):
         if len(units.draws):
             drawn = begin = max(drawn, begun) + units.draws[i]
         end = max(done, begin + alone[i])
+        if len(units.moves):
+            moved = max(moved, begun + units.start) + units.moves[i]
+            end = max(end, moved)
         heapq.heapreplace(free, end)
         heapq.heapreplace(served, done)
         found.append((begun, end))
@@ -104,3 +108,12 @@ def test_a_drawn_unit_is_held_by_its_queue():
     what = launch(50, dispatch="block_queue", grid=20, ATOMIC_REQUESTS=900)
     got = spans(replace(what, atomic_requests=np.array([45000])), H200, NOTHING)
     assert {OWN[index] for index in got.holds} == {"queue"}
+
+
+def test_blocks_leave_when_memory_has_moved_their_bytes_in_order():
+    what = replace(launch(600, FP32=100, LOAD_BYTES=2**19), streams=(Stream("a", "load", 600 * 2**19, 600 * 2**19),))
+    moved = traffic([what], H200)[0]
+    got, units = spans(what, H200, moved), opened(what, H200, moved).loads
+    assert got.units_end - got.units_begin == pytest.approx(play(units).end)
+    assert (got.end - got.units_begin >= np.cumsum(units.moves) * (1 - ROUNDING)).all()
+    assert units.moves.sum() > 2 * units.alone.max()
