@@ -4,18 +4,40 @@ Every time is a sum, a maximum or the soonest of earlier times, so the end is mo
 costs together (``models.schedule`` says why that matters). A step costs a replay in each of two tournaments.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tilestamp.models.kernel import kernel
 
 
+class Record(NamedTuple):
+    """Where the schedule is written down: arrays (units,), or all of length 0.
+
+    Parameters
+    ----------
+    start, end : ndarray, float64
+        When each unit got its place, and left it.
+    place : ndarray, int64
+        Which one it was.
+    """
+
+    start: Any
+    end: Any
+    place: Any
+
+
+@kernel
+def record_of(units: int) -> Record:
+    """Room for so many units."""
+    return Record(np.empty(units), np.empty(units), np.empty(units, np.int64))
+
+
 @kernel
 def list_schedule(
-    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, interval: float, start: float
+    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, interval: float, start: float, record: Record
 ) -> tuple[float, float]:
-    """End of all units; the start of the one that ends last.
+    """End of all units; the start of the one that ends last; each unit's in ``record``, if that has room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
     taken does not start at once later.
@@ -43,6 +65,8 @@ def list_schedule(
             moved = max(moved, begun + start) + moves[i]
             done = max(done, moved)
         done = max(done, begin + alone[i])
+        if len(record.start) > 0:
+            record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
         if done > end:
             end, last_start = done, begun
         if waits:

@@ -41,7 +41,7 @@ from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
 from tilestamp.models.demand import IN_THE_WAY, Demand
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
-from tilestamp.models.list_schedule import list_schedule
+from tilestamp.models.list_schedule import Record, list_schedule, record_of
 from tilestamp.models.numbers import Number as M
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
@@ -175,10 +175,10 @@ def play(units: Loads) -> Played:
         served += units.sm[i]
     mean, served = own / max(1, len(units.sm)), served / units.sms
     crowded, more = crowd(units)
-    end, started = _ends(units, crowded, units.places)
+    end, started = ends(units, crowded, units.places, record_of(0))
     waited = end * more / (own + more) if more else 0.0
     if more and own / units.sms < end + waited:
-        lonely, lonely_started = _ends(units, units.alone, units.sms)
+        lonely, lonely_started = ends(units, units.alone, units.sms, record_of(0))
         started = lonely_started if lonely < end else started
         return Played(
             min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, own
@@ -187,8 +187,10 @@ def play(units: Loads) -> Played:
 
 
 @kernel
-def _ends(units: Loads, alone: Any, places: int) -> tuple[float, float]:
-    return list_schedule(units.sm, alone, units.draws, units.moves, places, units.sms, units.interval, units.start)  # type: ignore[no-any-return]
+def ends(units: Loads, alone: Any, places: int, record: Record) -> tuple[float, float]:
+    """``list_schedule`` of what the units load the machine with."""
+    loads = units.sm, alone, units.draws, units.moves
+    return list_schedule(*loads, places, units.sms, units.interval, units.start, record)  # type: ignore[no-any-return]
 
 
 @kernel

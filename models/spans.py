@@ -5,19 +5,17 @@ after them what the memory and the atomic units of the chip, which serve side by
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.bounds import Term
-from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Launch
 from tilestamp.models.launch_prices import Opened
-from tilestamp.models.list_schedule import replay, tournament
+from tilestamp.models.list_schedule import Record, record_of
 from tilestamp.models.machine import Machine
 from tilestamp.models.price import opened, price
-from tilestamp.models.schedule import Loads, crowd
+from tilestamp.models.schedule import Loads, crowd, ends
 from tilestamp.models.traffic import Traffic
 
 OWN = ("latency", "issue", "shared", "l1", "queue")  # what can hold a unit
@@ -64,69 +62,28 @@ def spans(launch: Launch, machine: Machine, moved: Traffic) -> Spans:
     """
     whole = opened(launch, machine, moved)
     begin = float(whole.terms[Term.LAUNCH]) + whole.loads.begun
-    start, end, place, places = _sooner(whole.loads)
+    units, places = _sooner(whole.loads)
     return Spans(
-        start=begin + start,
-        end=begin + end,
-        place=place,
+        start=begin + units.start,
+        end=begin + units.end,
+        place=units.place,
         places=places,
         sms=whole.loads.sms,
         holds=_holds(whole),
         units_begin=begin,
-        units_end=begin + float(end.max(initial=0.0)),
+        units_end=begin + float(units.end.max(initial=0.0)),
         total=price([launch], machine, "schedule", [moved])[0].cycles,
         queue=float(whole.terms[Term.QUEUE]),
     )
 
 
-def _sooner(units: Loads) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], int]:
-    """Starts, ends, places and their number, as neighbours on the SMs or one an SM: whichever ends sooner."""
+def _sooner(units: Loads) -> tuple[Record, int]:
+    """Starts, ends and places, and how many of these, as neighbours on the SMs or one an SM: whichever ends sooner."""
     choices = []
     for alone, places in ((crowd(units)[0], units.places), (units.alone, units.sms)):
-        out = np.zeros(len(alone)), np.zeros(len(alone)), np.zeros(len(alone), np.int64)
-        _record(units.sm, alone, units.draws, units.moves, places, units.sms, units.interval, units.start, *out)
-        choices.append((*out, places))
-    return min(choices, key=lambda choice: float(choice[1].max(initial=0.0)))
-
-
-@kernel
-def _record(
-    sm: Any,
-    alone: Any,
-    draws: Any,
-    moves: Any,
-    places: int,
-    sms: int,
-    interval: float,
-    start: float,
-    begins: Any,
-    ends: Any,
-    where: Any,
-) -> None:
-    """``list_schedule`` that remembers: when each unit got its place, left it, and which it was."""
-    units = len(alone)
-    free, free_who = tournament(places if units > places else 1)
-    served, served_who = tournament(min(sms, units))
-    drawn, moved, begun = 0.0, 0.0, -interval
-    for i in range(units):
-        begun += interval
-        where[i] = i
-        if i >= places:
-            begun = max(begun, free[0])
-        if units > places:
-            where[i] = free_who[0]
-        begins[i] = begin = begun
-        done = max(served[0], begun + start) + sm[i]
-        replay(served, served_who, done)
-        if len(draws) > 0:
-            drawn = max(drawn, begun) + draws[i]
-            begin = drawn
-        if len(moves) > 0:
-            moved = max(moved, begun + start) + moves[i]
-            done = max(done, moved)
-        ends[i] = max(done, begin + alone[i])
-        if units > places:
-            replay(free, free_who, ends[i])
+        record = record_of(len(alone))
+        choices.append((ends(units, alone, places, record)[0], (record, places)))
+    return min(choices, key=lambda choice: choice[0])[1]
 
 
 def _holds(whole: Opened) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from tests.pricing import bounds, schedule
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch, Stream
-from tilestamp.models.list_schedule import list_schedule
+from tilestamp.models.list_schedule import list_schedule, record_of
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.traffic import Traffic, traffic
 
@@ -201,14 +201,16 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
         end = max(end, free[0])
         free, served = sorted(free), sorted(served)
     nothing = np.empty(0)
-    got = list_schedule(sm, alone, draws if queue else nothing, moves if moving else nothing, places, sms, 0.3, 0.7)
+    got = list_schedule(
+        sm, alone, draws if queue else nothing, moves if moving else nothing, places, sms, 0.3, 0.7, record_of(0)
+    )
     assert got[0] == pytest.approx(end, rel=1e-12)
 
 
 def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_later():
     """One place: a block of 10 from 0 on, then empty blocks at 10, 11, 12 and 13."""
     nothing, alone = np.zeros(5), np.array([10.0, 0.0, 0.0, 0.0, 0.0])
-    assert list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, 1.0, 0.0)[0] == 13.0
+    assert list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, 1.0, 0.0, record_of(0))[0] == 13.0
 
 
 def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
