@@ -1,10 +1,14 @@
 """What every test may ask for: the folder of real scenes and measurements that lies beside the project."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from tilestamp.simulator.scenes import Scene
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 SHARED_VARIABLE = "TILESTAMP_SHARED"  # names the folder where it lies elsewhere
@@ -58,3 +62,18 @@ def _scene_search_path() -> Iterator[None]:
 def pytest_configure(config: pytest.Config) -> None:
     """Name the tests that are small enough to run interpreted and with bounds checked."""
     config.addinivalue_line("markers", "small: quick enough with NUMBA_DISABLE_JIT=1 and with NUMBA_BOUNDSCHECK=1")
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> "Callable[..., Scene]":
+    """Write files, the last of them the scene, and load it."""
+    from tilestamp.simulator.scenes import load_scene
+
+    def loaded(name: str, content: str | bytes, **others: str | bytes) -> "Scene":
+        for other, text in {**others, name: content}.items():
+            path = tmp_path / other.replace("__", ".")
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return load_scene(tmp_path / name)
+
+    return loaded

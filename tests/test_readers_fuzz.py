@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.test_readers import CORNERS, FACES, PLY, SQUARE, TEXTURED, gltf, stl
+from tests.reader_files import CORNERS, FACES, PLY, SQUARE, TEXTURED, gltf, stl
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes import load_scene
 
