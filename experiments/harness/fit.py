@@ -98,9 +98,9 @@ def _status(cell: Cell, share: float) -> Status:
 
 
 def _repeated(cell: Cell, cells: list[Cell]) -> Cell:
-    """A word, or the number of another cell again, is as fitted as the most fitted of the cells that it is made of."""
+    """A word, or another cell's number again, is as fitted as the most fitted of what it is made of, and of itself."""
     made_of = [other for other in cells if (other.row, other.column) in cell.of]
     if not made_of or not (isinstance(cell.ours, str) or [other.ours for other in made_of] == [cell.ours]):
         return cell
-    most = max(made_of, key=lambda other: other.share)
+    most = max([cell, *made_of], key=lambda other: other.share)
     return replace(cell, status=_status(cell, most.share), share=most.share, fitted_by=most.fitted_by)

@@ -59,7 +59,7 @@ from tilestamp.simulator.scenes.camera import LookAt
 
 FOV_DEGREES = 45.0  # vertical; assumed
 NEAR, FAR = 0.25, 100.0  # model units; assumed
-ZOOMS = (1.0, 1.2, 1.44, 1.73)  # Figure 4 has four zoom levels, and does not say which: assumed
+ZOOMS = (1.0, 1.2, 1.44, 1.73)  # of Figure 4, which does not say: chosen with its order of tiles in sight
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,13 @@ def _fitted(scene: str, number: float, view: LookAt, *cells: str) -> FittedView:
     distance = Fitted(f"{scene}: distance of the view", number, cells, chosen=True)
     place = view.eye, view.target, view.up, view.fov_degrees, view.near, view.far
     return FittedView(*place, scene=scene, distance=distance)
+
+
+def _zoomed(level: int, distance: float) -> FittedView:
+    """A view of Figure 4: the paper's order of tiles was in sight when the levels were chosen."""
+    frame = f"killeroo zoom{level}"
+    cell = f"{frame} 1600x1200 | eisenacher2010-figure4 | zoom {level} | order in time"
+    return _fitted(frame, distance, _killeroo(distance), cell)
 
 
 def _patches(scene: str) -> str:
@@ -128,7 +135,7 @@ VIEWS: dict[str, dict[str, LookAt]] = {
             _patches("killeroo"),
             "killeroo 1600x1200 | eisenacher2010-table1 | 8x8 | patches written",
         ),
-        **{f"zoom{k}": _killeroo(KILLEROO_DISTANCE * zoom) for k, zoom in enumerate(ZOOMS, 1)},
+        **{f"zoom{k}": _zoomed(k, KILLEROO_DISTANCE * zoom) for k, zoom in enumerate(ZOOMS, 1)},
     },
     "spot": {"default": _spot(SPOT_DISTANCE)},
 }
