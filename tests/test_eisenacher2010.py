@@ -10,8 +10,10 @@ from tilestamp.experiments.eisenacher2010 import claims, figure4, frames, table1
 from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.write import draw_figure
+from tilestamp.models.fitted import names_cell
 from tilestamp.models.machine import altered
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.views import VIEWS
 
 EXPERIMENTS = (claims, figure4, table1, table2, table3)
 NOTE = "the teapot, because the tests are small"
@@ -148,6 +150,13 @@ def test_figure_4_names_an_order_of_its_three_tiles_at_each_zoom():
     orders = [cell.ours for cell in small("figure4").cells if cell.column == "order in time"]
     assert len(orders) == len(figure4.ZOOMS)
     assert all(sorted(order.split(" < ")) == ["16x16", "4x4", "8x8"] for order in orders)
+
+
+@pytest.mark.parametrize("zoom", figure4.ZOOMS[1:])
+def test_a_level_of_figure_4_names_the_order_that_it_was_chosen_on(zoom):
+    (target,) = VIEWS["killeroo"][f"zoom{zoom}"].distance.fitted_to
+    (cell,) = [c for c in small("figure4").cells if (c.row, c.column) == (f"zoom {zoom}", "order in time")]
+    assert names_cell(target, (cell.frame, "eisenacher2010-figure4", cell.row, cell.column))
 
 
 def test_claims_average_no_cell_that_was_fitted():

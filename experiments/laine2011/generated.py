@@ -10,7 +10,7 @@ vertex is shared.
 """
 
 import os
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,16 @@ from tilestamp.experiments.laine2011.heavy_tail import Places, heavy_tail_scene
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.remembered import remembered
+from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from tilestamp.experiments.harness.result import Cell
 
 MACHINE = "gtx480"
 PIPELINES = ("hardware", "cudaraster", "freepipe")
@@ -160,4 +167,21 @@ def warning() -> str:
     return (
         "GENERATED SCENES, not the authors': triangles, visible share and pixels a triangle as published, the tail of "
         "areas fitted to FreePipe at one size; all places are assumed"
+    )
+
+
+def draw_times(title: str, cells: "Sequence[Cell]", path: "Path") -> None:
+    """Draw times of frames beside the published ones."""
+    import pandas as pd
+
+    rows = [{"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status} for c in cells]
+    paired_bars(
+        pd.DataFrame(rows),
+        path,
+        label="cell",
+        ours="ms",
+        published="published",
+        status="status",
+        title=f"{title}, generated scenes, GTX 480 (published: on the real ones)",
+        y_label="time of a frame [ms]",
     )

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result
-from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, everything, frame_name, warning
+from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, draw_times, everything, frame_name, warning
 from tilestamp.experiments.laine2011.sweep import HEIGHT, SOURCE, WIDTH
-from tilestamp.reports.plots import paired_bars
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +38,8 @@ def run(progress: Progress) -> Result:
         notes=[
             (
                 "One number of all that several samples cost is fitted, on one cell: FairyForest, depth, no blend, 8 "
-                "samples. The rest of their mix is operations counted by hand."
+                "samples. The rest of their mix is operations counted by hand; that of blending anew, after its error "
+                "had been seen."
             ),
             f"{len(modes())} of {len(MODES)} modes were drawn; {VARIABLE}=all draws all.",
         ],
@@ -85,20 +85,4 @@ def emits_cell() -> Cell:
 
 
 def _draw(cells: "Sequence[Cell]", path: "Path") -> None:
-    import pandas as pd
-
-    rows = [
-        {"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status}
-        for c in cells
-        if c.unit == "ms"
-    ]
-    paired_bars(
-        pd.DataFrame(rows),
-        path,
-        label="cell",
-        ours="ms",
-        published="published",
-        status="status",
-        title="Samples a pixel, generated scenes, GTX 480 (published: on the real ones)",
-        y_label="time of a frame [ms]",
-    )
+    draw_times("Samples a pixel", [cell for cell in cells if cell.unit == "ms"], path)
