@@ -7,17 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import bounds, schedule
+from tests.pricing import bounds, microseconds, schedule
+from tests.test_known_times import AT_ONCE, DRAM, H200, NOTHING, OVERHEAD, START, launch_of
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch, Stream
-from tilestamp.models.list_schedule import list_schedule, record_of
 from tilestamp.models.machine import altered, load_machine
-from tilestamp.models.traffic import Traffic, traffic
+from tilestamp.models.traffic import traffic
 
 MACHINES = [load_machine(name) for name in ("gtx280", "gtx480", "gtx680", "h200")]
-H200 = MACHINES[-1]
-NOTHING = Traffic(0.0, 0.0, 1.0)
 ROUNDING = 1 + 1e-9
 COUNTED = ("sm.warp_size", "memory.bank", "memory.l2_line_bytes", "fixed_function", "identity")  # they change counts
 HASHED = ("atomics.unit_bytes", "atomics.units")  # they change which counters meet, for better or worse
@@ -62,10 +60,6 @@ def launches(draw):
         dispatch=dispatch,
         atomic_requests=draw(st.sampled_from([None, np.array([70000, 30]), np.full(300, 50)])),
     )
-
-
-def microseconds(launch, machine):
-    return schedule(launch, machine, traffic([launch], machine)[0]).milliseconds * 1e3
 
 
 def better(machine, key):
@@ -176,174 +170,6 @@ def test_the_spread_stays_where_another_unit_ends_last():
         spreads.append((got.low, got.high))
     assert spreads[0] == pytest.approx(spreads[1], rel=1e-3)
     assert got.low < 0.95 * got.milliseconds < 0.95 / 1.05 * got.high
-
-
-@settings(deadline=None, max_examples=60)
-@given(
-    seed=st.integers(0, 10**6),
-    units=st.integers(0, 60),
-    places=st.integers(1, 17),
-    sms=st.integers(1, 9),
-    queue=st.booleans(),
-    moving=st.booleans(),
-)
-def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, queue, moving):
-    """The same by two lists that are sorted after each unit."""
-    random = np.random.default_rng(seed)
-    sm, alone, draws, moves = (random.exponential(size, units) for size in (2.0, 9.0, 0.5, 0.8))
-    free, served, drawn, moved, end, begun = [0.0] * places, [0.0] * sms, 0.0, 0.0, 0.0, -0.3
-    for i in range(units):
-        begun = max(free[0], begun + 0.3)
-        served[0] = max(served[0], begun + 0.7) + sm[i]
-        drawn = max(drawn, begun) + draws[i]
-        moved = max(moved, begun + 0.7) + moves[i] if moving else 0.0
-        free[0] = max(served[0], moved, (drawn if queue else begun) + alone[i])
-        end = max(end, free[0])
-        free, served = sorted(free), sorted(served)
-    nothing = np.empty(0)
-    got = list_schedule(
-        sm, alone, draws if queue else nothing, moves if moving else nothing, places, sms, 0.3, 0.7, record_of(0)
-    )
-    assert got[0] == pytest.approx(end, rel=1e-12)
-
-
-def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_later():
-    """One place: a block of 10 from 0 on, then empty blocks at 10, 11, 12 and 13."""
-    nothing, alone = np.zeros(5), np.array([10.0, 0.0, 0.0, 0.0, 0.0])
-    assert list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, 1.0, 0.0, record_of(0))[0] == 13.0
-
-
-def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
-    """Describe blocks by event: one number for all, or one each."""
-    table = np.zeros((units, EVENTS))
-    for name, count in events.items():
-        table[:, MachineEvent[name]] = count
-    return Launch(
-        stage="stage",
-        kernel="kernel",
-        grid=units,
-        block=block,
-        registers=16,
-        shared_bytes=shared_bytes,
-        events=table,
-        atomic_requests=requests,
-    )
-
-
-AT_ONCE = altered(H200, {"launch.blocks_per_us": 1e6}, "assumed", "a test: blocks start together")
-START, DRAM = AT_ONCE.latency.block_launch_cycles, AT_ONCE.latency.dram_cycles
-OVERHEAD = AT_ONCE.launch.kernel_us * AT_ONCE.sm.clock_mhz
-ALL_SHARED = 200_000  # bytes: a block leaves no room for another
-
-
-def test_one_block_takes_its_own_time():
-    got = schedule(launch_of(1, CHAIN_LOAD=10), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + START + 10 * DRAM)
-
-
-@pytest.mark.parametrize(("blocks", "rounds"), [(1, 1), (132, 1), (133, 2), (264, 2), (265, 3), (1320, 10)])
-def test_equal_blocks_take_whole_rounds_of_the_sms(blocks, rounds):
-    got = schedule(launch_of(blocks, shared_bytes=ALL_SHARED, CHAIN_LOAD=100), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + rounds * (START + 100 * DRAM), rel=1e-4)
-
-
-@pytest.mark.parametrize(("blocks", "rounds"), [(132, 1), (133, 2), (264, 2), (396, 3)])
-def test_equal_blocks_of_instructions_share_their_sm(blocks, rounds):
-    """Side by side or one after another: four schedulers issue four warps' instructions a clock."""
-    got = schedule(launch_of(blocks, 512, CONTROL=0, LOAD=4 * 10**6), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + START + rounds * 10**6, rel=1e-4)
-
-
-def test_a_long_block_that_starts_at_once_hides_the_others():
-    chains = np.ones(1000)
-    chains[0] = 10**4
-    got = schedule(launch_of(1000, CHAIN_LOAD=chains), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + START + 10**4 * DRAM)
-
-
-def test_a_long_block_that_starts_last_comes_on_top_of_the_others():
-    chains = np.full(133, 100.0)
-    chains[-1] = 10**4
-    got = schedule(launch_of(133, shared_bytes=ALL_SHARED, CHAIN_LOAD=chains), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + 2 * START + 10100 * DRAM, rel=1e-4)
-
-
-def test_no_work_is_all_overhead():
-    assert schedule(launch_of(0), AT_ONCE, NOTHING).cycles == pytest.approx(OVERHEAD)
-
-
-def test_many_bytes_take_bytes_over_bandwidth_and_the_way_there():
-    what = launch_of(4000, CHAIN_LOAD=1, LOAD_BYTES=10**5)
-    got = schedule(what, AT_ONCE, Traffic(4e9, 0.0, 1.0))
-    way = START + DRAM
-    expected = OVERHEAD + way + 4e9 / AT_ONCE.dram_bytes_per_cycle + way / 2  # its first units are in step
-    assert got.cycles == pytest.approx(expected)
-
-
-def test_all_atomics_at_one_address_queue_there():
-    what = launch_of(100, ATOMIC_REQUESTS=1000, CHAIN_ATOMIC=1, requests=np.array([100_000]))
-    got = schedule(what, AT_ONCE, NOTHING)
-    queue = 100_000 * AT_ONCE.atomics.unit_ns_per_request * 1e-3 * AT_ONCE.sm.clock_mhz
-    sent = 1000 / AT_ONCE.atomics.sm_requests_per_clock  # by each SM: half of it is in the way
-    assert got.cycles == pytest.approx(OVERHEAD + START + AT_ONCE.latency.atomic_cycles + queue + sent / 2)
-
-
-def test_draws_at_one_counter_come_one_after_another_and_the_last_item_then_runs():
-    items = replace(
-        launch_of(1000, ATOMIC_REQUESTS=1, CHAIN_LOAD=10, requests=np.array([1000])),
-        grid=132, block=640, dispatch="warp_queue",
-    )  # fmt: skip
-    queue = 1000 * AT_ONCE.atomics.unit_ns_per_request * 1e-3 * AT_ONCE.sm.clock_mhz
-    sent = 1000 / AT_ONCE.atomics.unawaited_per_clock / 2  # by all units together: half of it comes on top
-    expected = OVERHEAD + START + queue + sent + 10 * DRAM
-    assert schedule(items, AT_ONCE, NOTHING).cycles == pytest.approx(expected, rel=1e-4)
-
-
-def test_an_sm_sends_its_atomics_at_its_own_rate_however_many_sms_there_are():
-    what = launch_of(1, 256, ATOMIC_REQUESTS=10**5)
-    times = [microseconds(what, altered(H200, {"sm.count": sms}, "assumed", "a test")) for sms in (66, 132, 264, 528)]
-    assert times == pytest.approx([times[0]] * 4)
-    assert times[0] == pytest.approx(10**5 / 0.987 / 1970.7, rel=0.05)
-
-
-@pytest.mark.parametrize(("blocks", "shared"), [(140, 8 / 132), (396, 2.0), (1320, 4.0)])
-def test_two_that_want_the_sm_together_are_half_of_the_time_in_each_others_way(blocks, shared):
-    """Neighbours' work is that of the blocks beyond one an SM; a block's own, of one warp, is that of its scheduler."""
-    sm, alone = 10**5 / 4, START + 10**5 * AT_ONCE.latency.alu_cycles
-    got = schedule(launch_of(blocks, 32, LOAD=10**5, CHAIN_ALU=10**5), AT_ONCE, NOTHING)
-    assert got.cycles == pytest.approx(OVERHEAD + alone + 0.5 * shared * sm, rel=1e-4)
-
-
-def test_a_block_more_on_an_sm_never_makes_a_long_block_late():
-    """Alone on its SM the long block ends by itself; the others then have 131 SMs, and time enough."""
-    chains = np.full(264, 10.0)
-    chains[0] = 10**4
-    what = launch_of(264, 32, CHAIN_LOAD=chains, LOAD=2000)
-    one, many = (schedule(what, altered(AT_ONCE, {"sm.max_blocks": n}, "assumed", "a test"), NOTHING) for n in (1, 32))
-    assert one.cycles == many.cycles == pytest.approx(OVERHEAD + START + 10**4 * DRAM)
-
-
-def test_equal_blocks_spread_by_what_they_are_in_each_others_way():
-    alone = schedule(launch_of(132, 32, LOAD=10**5, CHAIN_ALU=10**5), AT_ONCE, NOTHING)
-    together = schedule(launch_of(264, 32, LOAD=10**5, CHAIN_ALU=10**5), AT_ONCE, NOTHING)
-    assert alone.low == alone.milliseconds == alone.high
-    assert together.low < together.milliseconds < together.high
-
-
-def test_a_launch_of_one_round_is_in_step_with_itself():
-    """Half of what the chip needs comes on top, up to half of a unit's own time."""
-    chains = np.full(132, 100.0)
-    chains[0] = 0  # nothing but its start: the first request may come then
-    what = launch_of(132, CHAIN_LOAD=chains, LOAD_BYTES=10**4)
-    alone = START + 100 * DRAM
-    for share in (0.1, 0.3):
-        got = schedule(what, AT_ONCE, Traffic(share * alone * AT_ONCE.dram_bytes_per_cycle, 0.0, 1.0))
-        assert got.cycles == pytest.approx(OVERHEAD + alone * (1 + share / 2), rel=1e-4)
-
-
-@pytest.mark.parametrize(("blocks", "said"), [(2112, ", 1.00 rounds"), (3168, ", 1.50 rounds")])
-def test_where_a_time_may_step_is_said(blocks, said):
-    assert schedule(launch_of(blocks, 128), H200, NOTHING).residency == f"16 an SM by warps{said}"
 
 
 streams = st.lists(

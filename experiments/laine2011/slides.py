@@ -61,8 +61,8 @@ def run(progress: Progress) -> Result:
             (
                 "Fitted: of each scene the exponent of its areas, to FreePipe at 512x384 (Buddha: 1024x768), and the "
                 "set-up of a triangle in FreePipe, to Buddha at 512x384. SW:HW and FP:SW are ratios of times, above 1 "
-                "where the first is slower. How triangles crowd about the centre, and Buddha's ellipse, were chosen with "
-                "these times in sight: predicted cells followed no fitted number, but were not blind to the form."
+                "where the first is slower. How triangles crowd about the centre, and Buddha's ellipse, were chosen "
+                "with these times in sight: predicted cells followed no fitted number, but were not blind to the form."
             ),
             f"1024x768 without San Miguel, unless {VARIABLE}=all. No triangle count is scaled down.",
         ],

@@ -27,6 +27,7 @@ from tilestamp.models.simt import Coalescing, Simt
 from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from tilestamp.simulator.stages.liu2010.freepipe_lanes import WARP, FrameShape
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     SUBPIXEL_BITS,
     Pieces,
@@ -34,7 +35,7 @@ from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     make_pieces,
     start_edges,
 )
-from tilestamp.simulator.stages.liu2010.freepipe_warp import WARP, FrameShape, draw_blocks
+from tilestamp.simulator.stages.liu2010.freepipe_warp import draw_blocks
 from tilestamp.simulator.work import Work
 
 Packing = Literal["64", "32"]

@@ -5,16 +5,16 @@ each row that any lane still has, as many steps as the widest box among those la
 clipping go first; then the others scan the triangles of their clipped polygons, one after another.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tilestamp.models.atomics import CHUNK_BYTES, SECTOR
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
+from tilestamp.simulator.stages.liu2010.freepipe_lanes import SLOTS, WARP, FrameShape, Lanes, new_lanes
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     CLIPPED,
     INSIDE,
@@ -24,57 +24,8 @@ from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     start_edges,
 )
 
-WARP = 32
 INDEX_BYTES = 4
 POSITION_BYTES = 16
-_SLOTS = 64  # of a hash table: twice the lanes
-
-
-class FrameShape(NamedTuple):
-    """The frame buffer as threads address it."""
-
-    width: int
-    word_bytes: int
-    words: int  # atomics a fragment
-    plane_bytes: int  # bytes from a fragment's one word to the next
-    unroll: int  # pixels in a turn of the inner loop
-
-
-class Lanes(NamedTuple):
-    """One warp: scratch space of a worker."""
-
-    piece: NDArray[np.int64]  # (32,) the triangle that each lane scans, -1: none
-    row: NDArray[np.int64]  # (32, 9) edge functions at the row's first pixel, and their steps
-    pixel: NDArray[np.int64]  # (32, 3) edge functions at the pixel
-    row_depth: NDArray[np.float32]  # (32,)
-    depth: NDArray[np.float32]  # (32,)
-    address: NDArray[np.int64]  # (32,) of the lanes that hit, side by side
-    value: NDArray[np.uint64]  # (32,)
-    row_lane: NDArray[np.int64]  # (32,) the lanes that have the row in hand, side by side ...
-    row_pixel: NDArray[np.int64]  # (32,) ... the first pixel of each one's box in it ...
-    row_columns: NDArray[np.int64]  # (32,) ... and how many there are
-    seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
-    most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
-    slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
-
-
-@kernel
-def _new_lanes() -> Any:
-    return Lanes(
-        np.empty(WARP, np.int64),
-        np.empty((WARP, 9), np.int64),
-        np.empty((WARP, 3), np.int64),
-        np.empty(WARP, np.float32),
-        np.empty(WARP, np.float32),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.uint64),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.int64),
-        np.full((2, _SLOTS), -1, np.int64),
-        np.empty((2, _SLOTS), np.int64),
-        np.empty((WARP, 2), np.int64),
-    )
 
 
 @kernel
@@ -188,12 +139,12 @@ def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: 
 @kernel
 def _slot(seen: Any, most: Any, key: int) -> int:
     """Place of a key in a hash table; a new one begins with 0."""
-    i = key & (_SLOTS - 1)
+    i = key & (SLOTS - 1)
     while seen[i] != key:
         if seen[i] < 0:
             seen[i], most[i] = key, 0
         else:
-            i = (i + 1) & (_SLOTS - 1)
+            i = (i + 1) & (SLOTS - 1)
     return i
 
 
@@ -315,7 +266,7 @@ def draw_blocks(
     frame: Any,
 ) -> None:
     """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
-    lanes = _new_lanes()
+    lanes = new_lanes()
     for b in range(part, table.shape[0], parts):
         longest = 0
         for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
