@@ -12,7 +12,6 @@ from rich.console import Console
 
 from tilestamp import altered, load_machine, simulate
 from tilestamp.experiments.command_line import BAD_INPUT, run_command
-from tilestamp.experiments.commands import terminal
 from tilestamp.experiments.commands.compared import saved
 
 SMALL = ["--size", "64x48"]
@@ -126,7 +125,7 @@ def test_bad_input_is_one_sentence(arguments, says, tmp_path, monkeypatch, capsy
 @pytest.fixture
 def narrow(monkeypatch):
     """A terminal of 80 columns."""
-    monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=80, color_system=None))
+    monkeypatch.setattr("rich.console.Console", partial(Console, force_terminal=True, width=80, color_system=None))
 
 
 def test_why_has_a_sentence_a_stage_and_no_line_over_80_columns(narrow, capsys):

@@ -1,13 +1,12 @@
 """``tilestamp list``: what there is, a line each."""
 
-import json
-import sys
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import option_table
-from tilestamp.experiments.commands.terminal import print_entries, print_wrapped
+from tilestamp.experiments.commands.outputs import write_json
+from tilestamp.experiments.commands.tables import print_entries, print_words
 from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import list_machines, load_machine
@@ -49,7 +48,7 @@ def catalogue(
         return
     lines = entries(kind)
     if json_:
-        sys.stdout.write(json.dumps(lines) + "\n")
+        write_json(lines)
         return
     print_entries(lines)
 
@@ -61,10 +60,10 @@ def _list_options(pipeline: str, machine: str | None, json_: bool) -> None:
     for name, values in (launchable_values(pipeline, default, load_machine(machine)) if machine else {}).items():
         options[name]["takes"] += f"; {machine} can launch {listed(values) if values else 'none'}"
     if json_:
-        sys.stdout.write(json.dumps(options) + "\n")
+        write_json(options)
         return
     rows = [[name, *option.values()] for name, option in options.items()]
-    print_wrapped(["option", "takes", "default", "what it is"], rows)
+    print_words(rows, ["option", "takes", "default", "what it is"])
 
 
 def entries(kind: Kind) -> dict[str, str]:

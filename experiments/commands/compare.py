@@ -1,6 +1,5 @@
 """``tilestamp compare``: runs beside each other, stage by stage."""
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import product
@@ -11,7 +10,7 @@ from cyclopts import Parameter
 
 from tilestamp.experiments.commands.compared import Compared, from_run, print_comparison, saved, write_plot
 from tilestamp.experiments.commands.option_flags import given_options, literal, parted
-from tilestamp.experiments.commands.outputs import check_png
+from tilestamp.experiments.commands.outputs import check_png, write_json
 from tilestamp.experiments.commands.render import PIPELINE, parse_size
 from tilestamp.experiments.commands.terminal import Progress, progress
 from tilestamp.models.errors import TilestampError
@@ -87,7 +86,7 @@ def compare(
     if output is not None:
         write_plot(found, output)
     if json_:
-        sys.stdout.write(json.dumps([run.plain() for run in found]) + "\n")
+        write_json([run.plain() for run in found])
     else:
         print_comparison(found)
         sys.stdout.writelines([f"plot: {output}\n"] if output else [])

@@ -1,14 +1,14 @@
 """Runs beside each other: read back, printed, drawn."""
 
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isclose
 from pathlib import Path
 from typing import Any
 
-from tilestamp.experiments.commands.terminal import print_table, writing
+from tilestamp.experiments.commands.tables import print_lines, print_table
+from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.why import LITTLE
@@ -88,36 +88,35 @@ def _compared(name: str, scene: str, about: str, stages: dict[str, dict[str, Any
 
 def print_comparison(runs: Sequence[Compared]) -> None:
     """Print times, shares and ratios, then the bound of each stage and how that term changed."""
-    sys.stdout.writelines(f"{run.name}: {run.about}\n" for run in runs)
+    print_lines(*(f"{run.name}: {run.about}" for run in runs))
     first, *others = runs
     stages = [*dict.fromkeys(stage for run in runs for stage in run.times if stage != FRAME), FRAME]
     columns = ["stage"]
-    for index, run in enumerate(runs):
-        columns += [f"{run.name} ms", "share", *(["ratio"] if index else [])]
+    for run in runs:
+        columns += [f"{run.name} ms", "share", "ratio"]
     rows = [[stage, *(text for run in runs for text in _cells(stage, run, first))] for stage in stages]
-    sys.stdout.write("\n")
-    print_table(f"Milliseconds; ratio: to {first.name}", columns, rows)
+    print_lines("")
+    print_table(f"Milliseconds; ratio: to {first.name}", columns, rows, together=3)
     rows = [_change(stage, first, run) for stage in stages[:-1] for run in others if _differs(stage, first, run)]
     if rows:
-        sys.stdout.write("\n")
+        print_lines("")
         columns = ["stage", "run", "bound", "then", "term", "ms", "then ms", "ratio"]
         print_table(
             "Bound of each stage, and how that term changed; where it did not, the largest change",
             columns,
             rows,
             keys=2,
+            together=2,
         )
 
 
 def _cells(stage: str, run: Compared, first: Compared) -> list[str]:
     """Time and share of a stage, and the ratio to that of another run."""
     if stage not in run.times:
-        return ["", "", *([""] if run is not first else [])]
+        return ["", "", ""]
     time, whole = run.times[stage], run.times[FRAME]
-    cells = [f"{time:.4g}", f"{100 * time / whole:.1f} %" if whole else ""]
-    if run is first:
-        return cells
-    return [*cells, f"{time / first.times[stage]:.4g}" if first.times.get(stage) else ""]
+    share = f"{100 * time / whole:.1f} %" if whole else ""
+    return [f"{time:.4g}", share, f"{time / first.times[stage]:.4g}" if first.times.get(stage) else ""]
 
 
 def _differs(stage: str, first: Compared, run: Compared) -> bool:

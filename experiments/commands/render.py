@@ -1,16 +1,15 @@
 """``tilestamp render``: one picture, and the table of its stages."""
 
-import json
 import re
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
-from tilestamp.experiments.commands.outputs import check_file, check_png
+from tilestamp.experiments.commands.outputs import check_file, check_png, write_json
 from tilestamp.experiments.commands.render_output import as_json, map_path, print_run, write_map, write_png
+from tilestamp.experiments.commands.tables import print_lines
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.commands.trace import draw_timeline, write_schedule
 from tilestamp.experiments.commands.why import print_why, why_json, write_tornado
@@ -36,6 +35,7 @@ def render(
     counting: bool = True,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
+    columns: str = "",
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     option: Annotated[tuple[str, ...], Parameter(name=["--option", "-O"], negative="")] = (),
     set_: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
@@ -73,6 +73,8 @@ def render(
     map_
         Also write a heat map of this counter beside the picture, such as tests, into
         FILE.COUNTER.png; each pipeline has its own.
+    columns
+        Columns of the table: `all`, or names between commas; those that fit the terminal if not given.
     json_
         Print one JSON object instead of tables.
     option
@@ -114,12 +116,10 @@ def render(
     if output is not None:
         write_png(run.image, output)
     if json_:
-        sys.stdout.write(
-            json.dumps(as_json(run) | ({"why": why_json(explained.found)} if explained.found else {})) + "\n"
-        )
+        write_json(as_json(run) | ({"why": why_json(explained.found)} if explained.found else {}))
         return
-    print_run(run, output, map_)
-    sys.stdout.writelines(f"{line}\n" for line in explained.lines)
+    print_run(run, output, map_, columns)
+    print_lines(*explained.lines)
     if explained.found is not None and why:
         print_why(run, explained.found)
 

@@ -1,27 +1,17 @@
 """What ``tilestamp render`` leaves: a picture, a heat map, the table of stages or the run as JSON."""
 
-import math
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.commands.terminal import print_table, writing
+from tilestamp.experiments.commands.render_table import print_stages
+from tilestamp.experiments.commands.tables import print_lines
+from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.error_model import was_measured
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
-
-FORMATS = {"count": ",.0f", "bytes": ",.0f", "ratio": ".4f", "distribution": ",.1f"}  # by kind of a counter
-COST = {"blocks": ",.0f", "warps": ",.0f", "instructions": ",.0f", "simd_efficiency": ".3f"}  # before counters
-TIME = {  # after them
-    "atomics": ",.0f",
-    "occupancy": ".2f",
-    "achieved_occupancy": ".2f",
-    "milliseconds": ".3f",
-    "bound": "s",
-}
 
 
 def write_png(image: NDArray[np.uint8], path: Path) -> None:
@@ -59,7 +49,7 @@ def write_map(run: Run, name: str, path: Path) -> None:
 
 
 def as_json(run: Run) -> dict[str, Any]:
-    """The run as plain data; not-a-number becomes null."""
+    """The run as data for ``write_json``."""
     stages = run.stages.astype(object).to_dict(orient="index") if run.counted else {}
     return {
         "scene": run.scene,
@@ -71,12 +61,12 @@ def as_json(run: Run) -> dict[str, Any]:
         "fidelity": run.fidelity,
         "options": run.options,
         "milliseconds": run.milliseconds if run.counted else None,
-        "error_interval_milliseconds": _plain(run.error_interval) if _error_is_known(run) else None,
+        "error_interval_milliseconds": run.error_interval if _error_is_known(run) else None,
         **_sampling(run),
-        "stages": {stage: {key: _plain(value) for key, value in row.items()} for stage, row in stages.items()},
+        "stages": stages,
         "counters": {name: {"title": c.title, "kind": c.kind} for name, c in run.counters.items()},
         "counts": run.counts if run.counted else {},
-        "facts": {key: _plain(value) for key, value in run.frame.facts.items()},
+        "facts": run.frame.facts,
         "warnings": list(run.frame.remarks),
         "manifest": run.manifest(),
     }
@@ -88,34 +78,18 @@ def _sampling(run: Run) -> dict[str, Any]:
         return {}
     return {
         "error": run.error,
-        "sampled": _plain(run.sampled),
-        "intervals": {f"{stage}.{name}": list(estimate) for (stage, name), estimate in run.intervals.items()},
+        "sampled": run.sampled,
+        "intervals": {f"{stage}.{name}": estimate for (stage, name), estimate in run.intervals.items()},
     }
 
 
-def _plain(value: object) -> object:
-    """NumPy scalars and containers as JSON knows them."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    value = value.tolist() if hasattr(value, "tolist") else value
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def print_run(run: Run, output: Path | None, map_: str | None = None) -> None:
+def print_run(run: Run, output: Path | None, map_: str | None = None, columns: str = "") -> None:
     """Print the table of stages, and a line for all else that is to be said."""
-    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}"
+    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {_shown_time(run)}"
     if run.counted:
-        counted = {name: FORMATS[counter.kind] for counter in run.counters.values() for name in counter.columns}
-        columns = {name: kind for name, kind in (COST | counted | TIME).items() if name in run.stages}
-        rows = [
-            [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
-            for stage, row in run.stages[list(columns)].to_dict(orient="index").items()
-        ]
-        print_table(f"{title}: {_shown_time(run)}", ["stage", *columns], rows)
+        print_stages(run, title, columns)
     else:
-        sys.stdout.write(f"{title}: nothing was counted, so there is no time\n")
+        print_lines(title)
     lines = [
         _shown_error(run),
         run.note,
@@ -124,14 +98,18 @@ def print_run(run: Run, output: Path | None, map_: str | None = None) -> None:
         f"picture: {output}" if output else "",
     ]
     lines += [f"map of {map_}: {map_path(output, map_)}"] if output and map_ else []
-    sys.stdout.writelines(f"{line}\n" for line in lines if line)
+    print_lines(*filter(None, lines))
 
 
 def _shown_time(run: Run) -> str:
     """Show the frame's milliseconds, with their interval where the run was sampled."""
+    if not run.counted:
+        return "nothing was counted, so there is no time"
+    if run.fidelity == "counts":
+        return "counts, no time"
     if not run.sampled:
-        return f"{run.milliseconds:.2f} ms"
-    return f"{run.milliseconds:.2f} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
+        return f"{run.milliseconds:.4g} ms"
+    return f"{run.milliseconds:.4g} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
 
 
 def _shown_error(run: Run) -> str:

@@ -1,6 +1,5 @@
 """``tilestamp reproduce``: published tables beside ours."""
 
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -8,7 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.commands.outputs import write_json
+from tilestamp.experiments.commands.tables import print_table
+from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
 from tilestamp.experiments.harness.registry import experiment_names, select
 from tilestamp.experiments.harness.result import Outcome, Result
@@ -58,7 +59,7 @@ def reproduce(
         page = write_index(results, output)
     if json_:
         cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
-        sys.stdout.write(json.dumps(cells) + "\n")
+        write_json(cells)
     else:
         _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
     return _print_failures([outcomes[name] for name in chosen if outcomes[name].failure])

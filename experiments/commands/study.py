@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.terminal import print_table, progress
+from tilestamp.experiments.commands.tables import print_table
+from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.studies.cells import MOST_LISTED
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.places import StudyError

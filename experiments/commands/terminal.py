@@ -1,21 +1,14 @@
-"""What the commands share on a terminal: progress on standard error, tables on standard output."""
+"""What the commands share on a terminal: progress on standard error."""
 
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import zip_longest
 from pathlib import Path
 
 from rich.console import Console
 from rich.status import Status
-from rich.table import Table
-from rich.text import Text
 
 from tilestamp.models.compile_cache import on_compiling
 from tilestamp.models.errors import TilestampError
-
-WIDE = 240  # columns of a table that goes to a file or a pipe
-GAP = 2  # blanks between two columns
 
 
 @contextmanager
@@ -68,81 +61,3 @@ class Progress:
         self._status.stop()
         yield
         self._status.start()
-
-
-def print_table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], styles: Sequence[str] = (), keys: int = 1
-) -> None:
-    """Print a table on standard output; on a narrow terminal in parts below each other, each with the key columns.
-
-    Parameters
-    ----------
-    title : str
-    columns : sequence of str
-    rows : sequence of sequences of str
-    styles : sequence of str
-        Of the rows, as rich names them.
-    keys : int
-        Leading columns that say what a row is. The first is on the left, all others on the right.
-    """
-    console = Console()
-    wide = console if console.is_terminal else Console(width=WIDE)
-    wide.print(title, style="italic", markup=False, soft_wrap=True)
-    for index, part in enumerate(_parts([columns, *rows], keys, wide.width)):
-        if index:
-            wide.print()
-        wide.print(_part(part, columns, rows, styles, keys))
-
-
-def _parts(lines: Sequence[Sequence[str]], keys: int, width: int) -> list[list[int]]:
-    """Columns of each part that fits the width: the keys, whose words may go on below, and whole columns."""
-    key_words = [max((len(word) for line in lines for word in line[key].split()), default=0) for key in range(keys)]
-    room = width + GAP - sum(word + GAP for word in key_words)  # none after the last
-    parts: list[list[int]] = [] if keys < len(lines[0]) else [list(range(keys))]
-    left = 0
-    for column in range(keys, len(lines[0])):
-        needed = max(len(line[column]) for line in lines) + GAP
-        if not parts or needed > left:
-            parts.append(list(range(keys)))
-            left = room
-        parts[-1].append(column)
-        left -= needed
-    return parts
-
-
-def _part(
-    part: list[int], columns: Sequence[str], rows: Sequence[Sequence[str]], styles: Sequence[str], keys: int
-) -> Table:
-    """Lay out some columns of a table."""
-    table = Table(header_style="bold", box=None, pad_edge=False)
-    for column in part:
-        whole = column >= keys and len(part) > keys + 1  # a column alone in its part may be wider than the terminal
-        table.add_column(columns[column], justify="right" if column else "left", no_wrap=whole)
-    for row, style in zip_longest(rows, styles[: len(rows)]):
-        table.add_row(*(row[column] for column in part), style=style)
-    return table
-
-
-def print_wrapped(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table of words on standard output: long cells go on below, but for the names in the first column."""
-    table = Table(header_style="bold", box=None, pad_edge=False)
-    for index, column in enumerate(columns):
-        table.add_column(column, no_wrap=index == 0)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    Console().print(table)
-
-
-def print_entries(lines: Mapping[str, str]) -> None:
-    """Print a name and a sentence a line on standard output; on a terminal a long sentence goes on below itself."""
-    console = Console()
-    if not console.is_terminal:
-        width = max(map(len, lines), default=0)
-        sys.stdout.writelines(f"{name:{width}}  {line}\n" for name, line in lines.items())
-        return
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column()
-    for name, line in lines.items():
-        table.add_row(Text(name), Text(line))
-    console.print(table)

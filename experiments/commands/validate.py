@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.terminal import print_table, progress, writing
+from tilestamp.experiments.commands.tables import print_table
+from tilestamp.experiments.commands.terminal import progress, writing
 from tilestamp.experiments.validation.summary import by_kernel, fastest_tiles
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine

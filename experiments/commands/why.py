@@ -1,10 +1,10 @@
 """``tilestamp render --why``: what holds each stage, and what would help."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tilestamp.experiments.commands.terminal import print_entries, print_table, writing
+from tilestamp.experiments.commands.tables import print_entries, print_lines, print_table
+from tilestamp.experiments.commands.terminal import writing
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sensitivity import FRAME, Sensitivity
 from tilestamp.simulator.why import LITTLE, MEANING, plain, sentences
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def print_why(run: Run, found: Sensitivity) -> None:
     """Print a sentence a stage, then times with one thing free, elasticities, and steps of whole numbers."""
-    sys.stdout.write("\n")
+    print_lines("")
     print_entries(sentences(found))
     _print_free(found)
     _print_elasticities(found)
@@ -33,15 +33,15 @@ def _print_free(found: Sensitivity) -> None:
     free = found.free
     helps = [term for term in free if term == "now" or (free[term] < free["now"] * (1 - LITTLE)).any()]
     rows = [[str(stage), *(f"{times[term]:.4g}" for term in helps)] for stage, times in free[helps].iterrows()]
-    sys.stdout.write("\n")
+    print_lines("")
     print_table("Milliseconds now, and if one thing were free, priced anew", ["stage", *helps], rows)
-    sys.stdout.writelines(f"  {term}: {MEANING[term]}\n" for term in ("start", "balance", "tail") if term in helps)
+    print_lines(*(f"  {term}: {MEANING[term]}" for term in ("start", "balance", "tail") if term in helps))
 
 
 def _print_elasticities(found: Sensitivity) -> None:
     table = _moving(found.numbers, "elasticity")
     rows = [[str(number), *(_signed(value, ".2f") for value in row)] for number, row in table.iterrows()]
-    sys.stdout.write("\n")
+    print_lines("")
     print_table("Change of time in % as a number grows by 1 %", ["number", *map(str, table.columns)], rows)
 
 
@@ -57,7 +57,7 @@ def _print_steps(found: Sensitivity) -> None:
             texts = [_signed(100 * (change - 1), "+.1f") for change in changes]
             rows.append([str(number), plain(here["value"]), plain(here[to]), *texts])
     title = "Whole numbers step: change of time in % (-: no such machine, or no block fits)"
-    sys.stdout.write("\n")
+    print_lines("")
     print_table(title, ["number", "from", "to", *_stages(found.numbers)], rows, keys=3)
 
 
@@ -87,12 +87,11 @@ def _stepping(numbers: "pd.DataFrame") -> "pd.DataFrame":
 
 def why_json(found: Sensitivity) -> dict[str, Any]:
     """The same as plain data."""
-    numbers = found.numbers.astype(object).where(found.numbers.notna(), None)
     return {
         "sentences": sentences(found),
         "free": found.free.to_dict(orient="index"),
         "limits": found.limits.to_dict(orient="index"),
-        "numbers": numbers.to_dict(orient="records"),
+        "numbers": found.numbers.to_dict(orient="records"),
         "fixed": list(found.fixed),
         "zero": list(found.zero),
     }
