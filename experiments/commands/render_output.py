@@ -60,7 +60,7 @@ def write_map(run: Run, name: str, path: Path) -> None:
 
 def as_json(run: Run) -> dict[str, Any]:
     """The run as plain data; not-a-number becomes null."""
-    stages = run.stages.astype(object).to_dict(orient="index") if run.counted else {}
+    stages = run.stage_rows if run.counted else {}
     return {
         "scene": run.scene,
         "note": run.note,
@@ -108,10 +108,11 @@ def print_run(run: Run, output: Path | None, map_: str | None = None) -> None:
     title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}"
     if run.counted:
         counted = {name: FORMATS[counter.kind] for counter in run.counters.values() for name in counter.columns}
-        columns = {name: kind for name, kind in (COST | counted | TIME).items() if name in run.stages}
+        known = {name for row in run.stage_rows.values() for name in row}
+        columns = {name: kind for name, kind in (COST | counted | TIME).items() if name in known}
         rows = [
-            [str(stage), *("" if value != value else format(value, columns[name]) for name, value in row.items())]  # noqa: PLR0124 - not-a-number
-            for stage, row in run.stages[list(columns)].to_dict(orient="index").items()
+            [stage, *("" if row[name] != row[name] else format(row[name], kind) for name, kind in columns.items())]
+            for stage, row in run.stage_rows.items()
         ]
         print_table(f"{title}: {_shown_time(run)}", ["stage", *columns], rows)
     else:
