@@ -16,6 +16,31 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 TERMINATED = 143
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+COMMANDS = {  # where each is, and its line in the list of commands: its own first, which is not loaded for it
+    "render": ("render:render", "Draw SCENE and print what each stage did and how long it would take."),
+    "compare": (
+        "compare:compare",
+        "Compare runs stage by stage: times, shares, ratios, bounds, and how the term that bounds changed.",
+    ),
+    "study": ("study:study", "Run the cells of a study file that its store lacks, and print its table."),
+    "ask": ("ask:ask", "Ask a study: what is best where, what lies on a front, what matters, what is better still."),
+    "reproduce": (
+        "reproduce:reproduce",
+        "Print published tables beside what the model computes, cell by cell; write CSV, manifests, plots and a page.",
+    ),
+    "validate": (
+        "validate:validate",
+        "Print model against machine: by kernel and counter, from stored measurements, or on the GPU of this computer.",
+    ),
+    "measure-machine": (
+        "measure_machine:measure_machine",
+        "Run micro-benchmarks on the GPU of this computer and write a machine file, each number with its provenance.",
+    ),
+    "list": (
+        "catalogue:catalogue",
+        "List scenes, pipelines, machines or experiments, or the options of a pipeline, and what each is.",
+    ),
+}
 HELP = "Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time."
 
 
@@ -78,29 +103,25 @@ def _run(arguments: list[str]) -> int:
 
 
 def _app(arguments: list[str]) -> "App":
-    """Put the commands together; ``render`` has the flags of the pipeline that the arguments name."""
+    """Put the commands together, loaded when used; ``render`` has the flags of the pipeline that is named."""
     from cyclopts import App
-
-    from tilestamp.experiments.commands.ask import ask
-    from tilestamp.experiments.commands.catalogue import catalogue
-    from tilestamp.experiments.commands.compare import compare
-    from tilestamp.experiments.commands.measure_machine import measure_machine
-    from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
-    from tilestamp.experiments.commands.render import PIPELINE, render
-    from tilestamp.experiments.commands.reproduce import reproduce
-    from tilestamp.experiments.commands.study import study
-    from tilestamp.experiments.commands.validate import validate
 
     app = App(
         name="tilestamp",
         version=tilestamp.__version__,
+        version_format="plaintext",
         help=HELP,
         help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
-    draws = arguments[:1] == ["render"]
-    app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
-    for command in (compare, study, ask, reproduce, validate, measure_machine):
-        app.command(command)
-    app.command(catalogue, name="list")
+    for name, (place, line) in COMMANDS.items():
+        if name == "render" and arguments[:1] == [name]:
+            from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
+            from tilestamp.experiments.commands.render import PIPELINE, render
+
+            app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)))
+        else:
+            app.command(
+                f"tilestamp.experiments.commands.{place}", name=name, help=None if arguments[:1] == [name] else line
+            )
     return app

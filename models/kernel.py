@@ -13,8 +13,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, overload
 
+from llvmlite.binding import parse_assembly, parse_bitcode
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.codegen import JITCodeLibrary
+from numba.core.runtime import rtsys
 
 from tilestamp.models.compile_cache import cache_folder, note_compiling
 from tilestamp.models.kernel_digest import kernel_digest
@@ -82,6 +85,38 @@ class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
 
     _locator_classes = (_Locator,)
 
+    def reduce(self, cres: Any) -> Any:
+        """Serialize, without the environments of Numba's own functions that hold nothing: each loads its module."""
+        *all_else, environments = super().reduce(cres)
+        return (*all_else, [each for each in environments if each.consts or not _of_numba(each)])
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Load the machine code alone; the bitcode waits until another kernel is compiled against this one."""
+        (name, kind, (machine_code, bitcode)), described, *rest = payload
+        engine = target_context.codegen()._engine  # noqa: SLF001
+        engine._defined_symbols.add(described.llvm_cpython_wrapper_name)  # noqa: SLF001 - by which it is found
+        nothing = parse_assembly("").as_bitcode()
+        found = super().rebuild(target_context, ((name, kind, (machine_code, nothing)), described, *rest))
+        found.library.__class__ = _LoadedLibrary
+        found.library.bitcode = bitcode
+        return found
+
+
+class _LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code from disk, with bitcode that few need: to read it takes as long as to load the machine code."""
+
+    bitcode: bytes | None
+
+    def _get_module_for_linking(self) -> Any:
+        if self.bitcode is not None:
+            self._shared_module, self.bitcode = parse_bitcode(self.bitcode), None
+            self._codegen._engine._load_defined_symbols(self._shared_module)  # noqa: SLF001
+        return super()._get_module_for_linking()
+
+
+def _of_numba(environment: Any) -> bool:
+    return str(environment.globals["__name__"]).startswith("numba.")
+
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
     """The cache of one kernel; it is looked for at the first call, when all that the kernel reaches is defined."""
@@ -104,11 +139,16 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
         return str(self._cache_path)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load what was compiled for the signature, None if it was not; a file that cannot be read is none."""
+        """Load what was compiled for the signature, None if it was not; a file that cannot be read is none.
+
+        Numba would first load all that it can compile (``target_context.refresh``), which takes longer than a small
+        frame: what is on disk needs its memory manager alone.
+        """
         self._find()
+        rtsys.initialize(target_context)
         index = self._cache_file._index_path  # noqa: SLF001
         try:
-            found = super().load_overload(sig, target_context)
+            found = self._load_overload(sig, target_context)
             if found is not None:
                 os.utime(index)  # the mark by which pruning sees that it is in use
         except _UNREADABLE:
@@ -116,6 +156,7 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
             with contextlib.suppress(OSError):
                 Path(index).unlink()
         if found is None:
+            target_context.refresh()
             note_compiling(self._dispatcher.py_func)
         return found
 

@@ -24,7 +24,7 @@ from tilestamp.simulator.prices import Machines, Prices, machines_of, prices_of
 from tilestamp.simulator.sampling import intervals
 from tilestamp.simulator.sampling.estimate import Estimate, Floats
 from tilestamp.simulator.sensitivity import Sensitivity, sensitivity
-from tilestamp.simulator.stage_table import declared, interval_table, stage_table
+from tilestamp.simulator.stage_table import declared, stage_table
 from tilestamp.simulator.work import Work
 
 if TYPE_CHECKING:
@@ -102,8 +102,15 @@ class Run:
     @priced_property
     def stages(self) -> "pd.DataFrame":
         """One row a stage, in the order of the pipeline: counts, rates, cycles, milliseconds, bound."""
-        table = stage_table(self.frame.works, self.launches, self.timings, self.machine)
-        return table.join(interval_table(self.intervals)) if self.sampled else table
+        import pandas as pd
+
+        return pd.DataFrame.from_dict(self.stage_rows, orient="index").rename_axis("stage")
+
+    @priced_property
+    def stage_rows(self) -> dict[str, dict[str, Any]]:
+        """The table ``stages`` as plain values, by stage and column: pandas takes longer to load than a small frame."""
+        intervals = self.intervals if self.sampled else {}
+        return stage_table(self.frame.works, self.launches, self.timings, self.machine, intervals)
 
     @cached_property
     def counts(self) -> dict[str, int]:

@@ -1,7 +1,7 @@
 """The table of stages: launches gathered by stage, in the order of the pipeline."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,14 @@ from tilestamp.models.timing import Timing
 from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 def stage_table(
     works: Sequence[Work | FixedFunctionWork],
     launches: Sequence[Launch | PipeLaunch],
     timings: Sequence[Timing],
     machine: Machine,
-) -> "pd.DataFrame":
+    intervals: Mapping[tuple[str, str], Estimate],
+) -> dict[str, dict[str, Any]]:
     """Gather launches by stage.
 
     Parameters
@@ -32,20 +30,26 @@ def stage_table(
     works, launches, timings : sequences of equal length, in launch order
     machine : Machine
         On which they were priced.
+    intervals : mapping of (stage, number) to Estimate
+        Of what was sampled.
 
     Returns
     -------
-    DataFrame, indexed by stage
+    dict of dict
+        A row a stage; all have the same columns, not-a-number where a stage has nothing of the name.
     """
-    import pandas as pd
-
-    stages = list(dict.fromkeys(work.stage for work in works))
+    stages: dict[str, list[tuple[Any, Any, Timing]]] = {}
+    for part in zip(works, launches, timings, strict=True):
+        stages.setdefault(part[0].stage, []).append(part)
     counters = declared(works)
-    rows = [
-        _row([part for part in zip(works, launches, timings, strict=True) if part[0].stage == stage], machine, counters)
-        for stage in stages
-    ]
-    return pd.DataFrame(rows, index=pd.Index(stages, name="stage"))
+    rows = {stage: _row(parts, machine, counters) | _ends(stage, intervals) for stage, parts in stages.items()}
+    columns = dict.fromkeys(name for row in rows.values() for name in row)
+    return {stage: {name: _builtin(row.get(name, np.nan)) for name in columns} for stage, row in rows.items()}
+
+
+def _builtin(value: object) -> object:
+    """A number of NumPy's as Python's own."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def declared(works: Sequence[Work | FixedFunctionWork]) -> dict[str, Counter]:
@@ -115,12 +119,10 @@ def _terms(timings: list[Timing]) -> dict[str, float]:
     return terms
 
 
-def interval_table(intervals: Mapping[tuple[str, str], Estimate]) -> "pd.DataFrame":
-    """Ends of the intervals of each stage, a column each (``milliseconds_low``, ``milliseconds_high``...)."""
-    import pandas as pd
-
-    rows: dict[str, dict[str, float]] = {}
-    for (stage, name), estimate in intervals.items():
-        if stage != "frame":
-            rows.setdefault(stage, {}).update({f"{name}_low": estimate.low, f"{name}_high": estimate.high})
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("stage")
+def _ends(stage: str, intervals: Mapping[tuple[str, str], Estimate]) -> dict[str, float]:
+    """Ends of the intervals of one stage, a column each (``milliseconds_low``, ``milliseconds_high``...)."""
+    ends: dict[str, float] = {}
+    for (owner, name), estimate in intervals.items():
+        if owner == stage:
+            ends |= {f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+    return ends

@@ -109,7 +109,7 @@ def render(
         run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked)
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
-            _ = run.stages
+            _ = run.stage_rows
         explained = _explained(run, why, tornado, trace, timeline)
     if map_ is not None and output is not None:
         write_map(run, map_, map_path(output, map_))

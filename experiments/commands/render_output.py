@@ -50,7 +50,7 @@ def write_map(run: Run, name: str, path: Path) -> None:
 
 def as_json(run: Run) -> dict[str, Any]:
     """The run as data for ``write_json``."""
-    stages = run.stages.astype(object).to_dict(orient="index") if run.counted else {}
+    stages = run.stage_rows if run.counted else {}
     return {
         "scene": run.scene,
         "note": run.note,

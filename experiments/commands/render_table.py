@@ -1,5 +1,6 @@
 """The table of stages that ``tilestamp render`` prints: what matters first, the rest where it fits or on request."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -34,7 +35,7 @@ def print_stages(run: Run, title: str, columns: str = "") -> None:
     names = list(texts)
     if columns and columns != ALL:
         names = [_known(name.strip(), names) for name in columns.split(",")]
-    rows = [[str(stage), *cells] for stage, *cells in zip(run.stages.index, *(texts[n] for n in names), strict=True)]
+    rows = [[str(stage), *cells] for stage, *cells in zip(run.stage_rows, *(texts[n] for n in names), strict=True)]
     least = sum(name in LEADING for name in names)
     left = print_table(title, ["stage", *names], rows, first=0 if columns else least)
     if left:
@@ -50,15 +51,17 @@ def _known(name: str, names: Sequence[str]) -> str:
 
 def stage_texts(run: Run) -> dict[str, list[str]]:
     """Cells of each column of the stages as texts: the leading ones first, none that says nothing."""
-    stages = run.stages
-    if run.milliseconds > 0:
-        stages = stages.assign(share=stages["milliseconds"] / run.milliseconds)
-    else:  # nothing was priced
-        stages = stages.drop(columns=["milliseconds", "bound"])
-    names = [name for name in (*LEADING, *NEXT) if name in stages]
-    names += [name for name in stages if name not in names]
+    rows = [dict(row) for row in run.stage_rows.values()]
+    for row in rows:
+        if run.milliseconds > 0:
+            row["share"] = row["milliseconds"] / run.milliseconds
+        else:  # nothing was priced
+            del row["milliseconds"], row["bound"]
+    found = list(dict.fromkeys(name for row in rows for name in row))
+    names = [name for name in (*LEADING, *NEXT) if name in found]
+    names += [name for name in found if name not in names]
     kinds = {name: FORMATS[counter.kind] for counter in run.counters.values() for name in counter.columns}
-    texts = {name: [_text(value, name, kinds) for value in stages[name]] for name in names}
+    texts = {name: [_text(row.get(name, math.nan), name, kinds) for row in rows] for name in names}
     return {name: cells for name, cells in texts.items() if any(cells)}
 
 

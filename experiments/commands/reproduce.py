@@ -28,7 +28,7 @@ def reproduce(
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     jobs: Annotated[int | None, Parameter(name=["--jobs", "-j"])] = None,
 ) -> int:
-    """Print published tables beside what the model computes, cell by cell, and write CSV, manifests, plots and a page.
+    """Print published tables beside what the model computes, cell by cell; write CSV, manifests, plots and a page.
 
     Parameters
     ----------
