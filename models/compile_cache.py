@@ -34,9 +34,9 @@ def _folder(named: str, flags: tuple[str, ...]) -> Path:
     return folder
 
 
-def on_compiling(listener: Callable[[str], None]) -> None:
+def on_compiling(listener: Callable[[str], None] | None) -> None:
     """Tell ``listener``, and no other, what is now being compiled, as ``module.kernel``; ``""`` when nothing is."""
-    _listeners[:] = [listener]
+    _listeners[:] = [listener] if listener else []
 
 
 def note_compiling(function: Callable[..., Any]) -> None:

@@ -7,6 +7,7 @@ import pytest
 from rich.console import Console
 
 from tilestamp.experiments.commands import tables, terminal
+from tilestamp.models.compile_cache import note_compiled, note_compiling
 
 WIDTH = 40
 COLUMNS = ["stage", *(f"column_{i}" for i in range(7))]
@@ -126,3 +127,11 @@ def test_a_terminal_shows_what_is_compiled_now_and_how_many_are_done(monkeypatch
     say.compiling("stage.kernel")
     say.compiling("")
     assert shown == ["0 of 2: drawing", "0 of 2: drawing: compiling stage.kernel (first run only)", "0 of 2: drawing"]
+
+
+def test_nothing_is_said_after_the_end(capsys):
+    with terminal.progress("drawing"):
+        pass
+    note_compiling(_terminal)
+    note_compiled()
+    assert capsys.readouterr().err == ""

@@ -34,7 +34,10 @@ def progress(text: str) -> Iterator["Progress"]:
     with console.status(text, spinner=spinner) as status:
         said = Progress(console, status, text)
         on_compiling(said.compiling)
-        yield said
+        try:
+            yield said
+        finally:
+            on_compiling(None)
 
 
 class Progress:
