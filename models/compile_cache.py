@@ -15,6 +15,7 @@ STALE_DAYS = 14  # what was not loaded for so long is removed
 _FLAGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")
 _PRUNED = "pruned"  # a file whose age says when stale kernels were last removed
 _listeners: list[Callable[[str], None]] = []
+_compiling: list[str] = []  # a kernel, and those that it waits for
 
 
 def cache_folder() -> Path:
@@ -33,15 +34,26 @@ def _folder(named: str, flags: tuple[str, ...]) -> Path:
     return folder
 
 
-def on_compiling(listener: Callable[[str], None]) -> None:
-    """Tell ``listener`` the name of each kernel that is about to be compiled, as ``module.kernel``."""
-    _listeners.append(listener)
+def on_compiling(listener: Callable[[str], None] | None) -> None:
+    """Tell ``listener``, and no other, what is now being compiled, as ``module.kernel``; ``""`` when nothing is."""
+    _listeners[:] = [listener] if listener else []
 
 
 def note_compiling(function: Callable[..., Any]) -> None:
     """Say that a kernel is about to be compiled."""
+    _compiling.append(f"{function.__module__.rpartition('.')[2]}.{function.__name__.lstrip('_')}")
+    _tell()
+
+
+def note_compiled() -> None:
+    """Say that the kernel is compiled which was last begun."""
+    del _compiling[-1:]
+    _tell()
+
+
+def _tell() -> None:
     for listener in _listeners:
-        listener(f"{function.__module__.rpartition('.')[2]}.{function.__name__}")
+        listener(_compiling[-1] if _compiling else "")
 
 
 def _user_cache() -> Path:

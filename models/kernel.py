@@ -19,7 +19,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLoca
 from numba.core.codegen import JITCodeLibrary
 from numba.core.runtime import rtsys
 
-from tilestamp.models.compile_cache import cache_folder, note_compiling
+from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling
 from tilestamp.models.kernel_digest import kernel_digest
 
 _UNREADABLE = (OSError, EOFError, AttributeError, ImportError, KeyError, pickle.UnpicklingError)
@@ -165,6 +165,7 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
         self._find()
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
+        note_compiled()
 
     def flush(self) -> None:
         """Forget what was compiled."""

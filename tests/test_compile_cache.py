@@ -46,12 +46,33 @@ def _forget():
 
 def _kernels_compiled(folder, monkeypatch):
     """Import the package anew and run its driver: the answer, and the kernels that were compiled for it."""
+    answer, told = _told(folder, monkeypatch)
+    return answer, sorted({*told} - {""})
+
+
+def _told(folder, monkeypatch):
+    """Import the package anew and run its driver: the answer, and what a listener is told meanwhile."""
     _forget()
     sys.dont_write_bytecode = True
-    listeners = []
-    monkeypatch.setattr(compile_cache, "_listeners", [listeners.append])
-    answer = importlib.import_module(f"{folder.name}.stage").driver(5)
-    return answer, sorted(listeners)
+    told = []
+    monkeypatch.setattr(compile_cache, "_listeners", [])
+    compile_cache.on_compiling(told.append)
+    return importlib.import_module(f"{folder.name}.stage").driver(5), told
+
+
+@compiled
+def test_a_listener_is_told_what_is_being_compiled_now_and_when_nothing_is(project, monkeypatch):
+    assert _told(project, monkeypatch)[1] == ["stage.stage", "helper.scaled", "stage.stage", ""]
+
+
+def test_only_the_last_listener_is_told(monkeypatch):
+    monkeypatch.setattr(compile_cache, "_listeners", [])
+    told = []
+    for name in ("first", "last"):
+        compile_cache.on_compiling(lambda kernel, name=name: told.append((name, kernel)))
+    compile_cache.note_compiling(_forget)
+    compile_cache.note_compiled()
+    assert told == [("last", "test_compile_cache.forget"), ("last", "")]
 
 
 def _edit(path, old, new):

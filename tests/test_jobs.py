@@ -11,7 +11,10 @@ import pytest
 
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
+from tilestamp.experiments.harness.pool import pool
 from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.telling import so_far
+from tilestamp.models.compile_cache import note_compiled, note_compiling
 from tilestamp.models.errors import MissingInputError
 from tilestamp.models.fitted import Fitted
 
@@ -111,8 +114,29 @@ def test_a_worker_that_dies_is_a_sentence(tmp_path, monkeypatch):
     assert not active_children()
 
 
+def _compile_something(_):
+    note_compiling(_compile_something)
+    note_compiled()
+
+
+def test_processes_say_what_they_compile():
+    told = []
+    with pool(2, say=told.append) as workers:
+        list(workers.map(_compile_something, [1]))
+    assert told == ["running: compiling test_jobs.compile_something (first run only)", "running"]
+
+
+def test_what_is_so_far_done_says_how_long_the_rest_takes():
+    assert so_far(3, 9, 30.0, " cells") == "3 of 9 cells, about 60 s left"
+
+
+@pytest.mark.parametrize(("done", "said"), [(0, "0 of 9"), (9, "9 of 9")])
+def test_before_the_first_and_after_the_last_no_time_is_left(done, said):
+    assert so_far(done, 9, 30.0) == said
+
+
 def test_a_worker_whose_parent_is_gone_ends(tmp_path):
-    code = f"from tilestamp.experiments.harness.jobs import _send; _send('{tmp_path}/nobody', 'here')"
+    code = f"from tilestamp.experiments.harness.telling import tell; tell('{tmp_path}/nobody', 'here')"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 1  # noqa: S603 - it is our own command
 
 
@@ -128,11 +152,12 @@ main()
 def test_an_order_to_end_leaves_no_process_and_no_file(order, code, tmp_path):
     names = ["eisenacher2010/claims", "laine2011/memory"]
     command = [sys.executable, "-c", COMMAND, "reproduce", *names, "-j", "2", "-o", str(tmp_path)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - it is our own command
+    shown = os.environ | {"FORCE_COLOR": "1"}  # rich then takes a pipe for a terminal
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, env=shown, text=True, start_new_session=True)  # noqa: S603 - it is our own command
     assert process.stderr is not None
-    for line in process.stderr:
-        if line.strip() in names:  # a worker says so: it runs
-            break
+    said = ""
+    while not any(name in said for name in names):  # until a worker says that it runs
+        said += process.stderr.read(1)
     os.killpg(process.pid, order)  # as a terminal does: the workers hear it too
     said = process.communicate(timeout=30)[1]  # ends when no process holds the pipe any more
     assert process.returncode == code

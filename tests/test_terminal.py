@@ -1,11 +1,13 @@
-"""Tables on a narrow terminal: nothing is cut off."""
+"""What the commands print on a terminal: tables of which nothing is cut off, and progress."""
 
 from functools import partial
+from io import StringIO
 
 import pytest
 from rich.console import Console
 
-from tilestamp.experiments.commands import tables
+from tilestamp.experiments.commands import tables, terminal
+from tilestamp.models.compile_cache import note_compiled, note_compiling
 
 WIDTH = 40
 COLUMNS = ["stage", *(f"column_{i}" for i in range(7))]
@@ -93,3 +95,43 @@ def test_a_long_sentence_goes_on_below_itself(lines):
     said = lines(tables.print_entries, {"killeroo": "a model that is not here, so put it on the path"})
     assert all(line.startswith(" " * len("killeroo")) for line in said[1:])
     assert len(said) > 1
+
+
+def _terminal(*, tty):
+    console = Console(file=StringIO(), force_terminal=tty, width=200, color_system=None)
+    return console, terminal.Progress(console, console.status("drawing"), "drawing")
+
+
+def test_progress_is_silent_where_there_is_no_terminal():
+    console, say = _terminal(tty=False)
+    say("pricing")
+    say.count(1, 3)
+    assert console.file.getvalue() == ""
+
+
+def test_compiling_is_said_once_for_each_thing_where_there_is_no_terminal():
+    console, say = _terminal(tty=False)
+    for text in ("one", "two"):
+        say(text)
+        for kernel in ("a", "b", ""):
+            say.compiling(kernel)
+    said = console.file.getvalue().splitlines()
+    assert said == [f"{text}: compiling kernels (first run only)" for text in ("one", "two")]
+
+
+def test_a_terminal_shows_what_is_compiled_now_and_how_many_are_done(monkeypatch):
+    shown = []
+    _, say = _terminal(tty=True)
+    monkeypatch.setattr(say._status, "update", lambda text: shown.append(str(text)))
+    say.count(0, 2)
+    say.compiling("stage.kernel")
+    say.compiling("")
+    assert shown == ["0 of 2: drawing", "0 of 2: drawing: compiling stage.kernel (first run only)", "0 of 2: drawing"]
+
+
+def test_nothing_is_said_after_the_end(capsys):
+    with terminal.progress("drawing"):
+        pass
+    note_compiling(_terminal)
+    note_compiled()
+    assert capsys.readouterr().err == ""

@@ -109,8 +109,9 @@ def _runs(axes: dict[str, Sequence[Any]], say: Progress) -> Iterator[Compared]:
         _machine(chosen), _options(chosen), parse_size(chosen["size"])
     several = [name for name, values in axes.items() if len(values) > 1]
     before: tuple[Any, Run] | None = None
-    for chosen in combinations:
+    for done, chosen in enumerate(combinations):
         name = ", ".join(_said(key, chosen[key]) for key in several) or str(chosen["machine"])
+        say.count(done, len(combinations))
         say(name)
         counted = [value for key, value in chosen.items() if key != "machine" and not key.startswith("--set ")]
         known = before[1] if before is not None and before[0] == counted else None

@@ -52,6 +52,7 @@ def reproduce(
         outcomes: dict[str, Outcome] = {}
         for outcome in run_experiments(chosen, output, options, say, jobs or default_jobs()):
             outcomes[outcome.name] = outcome
+            say.count(len(outcomes), len(chosen))
             if outcome.result is not None and not json_:
                 with say.paused():
                     _print_result(outcome.result)

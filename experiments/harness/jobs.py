@@ -5,27 +5,21 @@ Compiling kernels holds one core, so that two processes make the first run on tw
 
 import os
 import shutil
-import socket
 import traceback
-from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import chain, groupby
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from threading import Thread
 from typing import Any
 
 from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.pool import end_processes, unordered
 from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
 from tilestamp.experiments.harness.result import Figure, Outcome, Result
+from tilestamp.experiments.harness.telling import listening, tell, tell_compiling
 from tilestamp.experiments.harness.write import SCRATCH, write_result
 from tilestamp.models.errors import MissingInputError, TilestampError
-
-LONGEST = 4096  # bytes of one line of progress
 
 
 def default_jobs() -> int:
@@ -61,8 +55,8 @@ def run_experiments(
     groups = [list(group) for _, group in groupby(names, key=(lambda name: name) if jobs == 1 else process_of)]
     left = dict.fromkeys(names)
     try:
-        with _listener(say) as address:
-            told = say if jobs == 1 else partial(_send, address)
+        with listening(say) as address:
+            told = say if jobs == 1 else address
             tasks = [delayed(_run_all)(group, output, options, told) for group in groups]
             for outcome in chain.from_iterable(unordered(tasks, jobs)):
                 del left[outcome.name]
@@ -76,9 +70,15 @@ def run_experiments(
             shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], say: Progress) -> list[Outcome]:
-    """Run some experiments one after another, perhaps in a process of their own."""
-    return [_run(name, output, options, say) for name in names]
+def _run_all(names: Sequence[str], output: Path, options: dict[str, Any], told: Progress | str) -> list[Outcome]:
+    """Run some experiments one after another, here or in a process that tells an address what it does."""
+    if callable(told):
+        return [_run(name, output, options, told) for name in names]
+    outcomes = []
+    for name in names:
+        tell_compiling(told, name)
+        outcomes.append(_run(name, output, options, partial(tell, told)))
+    return outcomes
 
 
 def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Outcome:
@@ -101,28 +101,3 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
 
 def _drawn(_path: Path) -> None:
     """Stand for a figure that has been drawn."""
-
-
-@contextmanager
-def _listener(say: Progress) -> Iterator[str]:
-    """Pass on what workers send to an address."""
-    with TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
-        address = f"{folder}/progress"
-        receiver.bind(address)
-        lines = map(bytes.decode, iter(partial(receiver.recv, LONGEST), b""))
-        thread = Thread(target=deque, args=(map(say, lines), 0), daemon=True)  # a deque without room: says them all
-        thread.start()
-        try:
-            yield address
-        finally:
-            _send(address, "")
-            thread.join()
-
-
-def _send(address: str, text: str) -> None:
-    """Say what is being done; where nobody listens any more, the parent is gone, and so are we."""
-    try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
-            sender.sendto(text.encode()[:LONGEST], address)
-    except OSError:
-        os._exit(1)

@@ -11,6 +11,7 @@ from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tilestamp.experiments.harness.cluster import cluster_backend, cluster_client
+from tilestamp.experiments.harness.telling import listening, tell_compiling
 from tilestamp.models.errors import TilestampError
 
 if TYPE_CHECKING:
@@ -40,9 +41,10 @@ def unordered(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
 class Pool:
     """Workers; made by ``pool``."""
 
-    def __init__(self, jobs: int, client: "Client | None") -> None:
+    def __init__(self, jobs: int, client: "Client | None", address: str = "") -> None:
         self.jobs = jobs
         self._client = client
+        self._address = address
 
     def map(self, function: Callable[[T], R], tasks: Sequence[T]) -> Iterator[R]:
         """Results of a function for some tasks, as they come.
@@ -57,7 +59,7 @@ class Pool:
         settings, died, deaths = self._backend()
         left = dict(enumerate(tasks))
         while left:
-            calls = [delayed(_numbered)(function, *item) for item in left.items()]
+            calls = [delayed(_numbered)(function, *item, self._address) for item in left.items()]
             try:
                 with parallel_config(**settings):
                     for number, result in unordered(calls, self.jobs):
@@ -82,12 +84,14 @@ class Pool:
         return {"backend": "loky", "idle_worker_timeout": IDLE}, TerminatedWorkerError, RETRIES
 
 
-def _numbered(function: Callable[[T], R], number: int, task: T) -> tuple[int, R]:
+def _numbered(function: Callable[[T], R], number: int, task: T, address: str) -> tuple[int, R]:
+    if address:
+        tell_compiling(address, "running")
     return number, function(task)
 
 
 @contextmanager
-def pool(jobs: int, cluster: str | None = None) -> Iterator[Pool]:
+def pool(jobs: int, cluster: str | None = None, say: Callable[[str], None] | None = None) -> Iterator[Pool]:
     """Give workers.
 
     Parameters
@@ -96,6 +100,8 @@ def pool(jobs: int, cluster: str | None = None) -> Iterator[Pool]:
         Processes here; 1 runs everything in this one. Of a cluster elsewhere, its own number counts.
     cluster : str, optional
         ``local`` starts one of ``jobs`` processes here; else the address of a scheduler, ``tcp://HOST:8786``.
+    say : callable, optional
+        Told what processes of this computer are compiling.
 
     Raises
     ------
@@ -107,7 +113,11 @@ def pool(jobs: int, cluster: str | None = None) -> Iterator[Pool]:
             yield Pool(max(sum(client.ncores().values()), 1), client)
         return
     try:
-        yield Pool(jobs, None)
+        if say is None or jobs == 1:
+            yield Pool(jobs, None)
+        else:
+            with listening(say) as address:
+                yield Pool(jobs, None, address)
     except BaseException:
         if jobs > 1:
             end_processes()

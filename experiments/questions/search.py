@@ -1,11 +1,13 @@
 """A search for the best point of a study's space: optuna asks, cells answer, all of them in the study's store."""
 
 import logging
+import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tilestamp.experiments.harness.telling import so_far
 from tilestamp.experiments.questions.space import Space, extra, values_at
 from tilestamp.experiments.studies.axes import shown
 from tilestamp.experiments.studies.study import Study
@@ -60,6 +62,7 @@ def search(
     sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True, n_startup_trials=16)
     asked = optuna.create_study(directions=["minimize"] * len(wanted), sampler=sampler)
     rows: list[dict[str, Any]] = []
+    begin = time.perf_counter()
     while len(rows) < cells:
         trials = [asked.ask() for _ in range(min(TOGETHER, cells - len(rows)))]
         points = space.points([[_share(trial, name, space.length(name)) for name in space.names] for trial in trials])
@@ -70,7 +73,7 @@ def search(
             place = {name: shown(value) for name, value in point.items()}
             numbers = dict(zip(wanted, row.tolist(), strict=True))
             rows.append(place | numbers | ({"problem": problem} if problem else {}))
-        say(f"{len(rows)} of {cells} cells")
+        say(so_far(len(rows), cells, time.perf_counter() - begin, " cells"))
     if all(trial.state == optuna.trial.TrialState.FAIL for trial in asked.trials):
         raise TilestampError(f"none of {cells} cells has a number to compare: {rows[0].get('problem', '')}")
     best = {trial.number for trial in asked.best_trials}

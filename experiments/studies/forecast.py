@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from tilestamp.experiments.harness.telling import duration
 from tilestamp.experiments.studies.cells import MOST_LISTED, missing
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.parameters import Resolver
@@ -107,11 +108,3 @@ def count(number: int, noun: str) -> str:
     """Say a number of things: ``1 cell``, ``1,200 cells``."""
     plural = f"{noun}es" if noun.endswith("s") else f"{noun}s"
     return f"{number:,} {noun if number == 1 else plural}"
-
-
-def duration(seconds: float) -> str:
-    """Say a time: ``3 s``, ``5 min``, ``12 h``, ``40 days``."""
-    for unit, size in (("days", 172800.0), ("h", 7200.0), ("min", 120.0)):
-        if seconds >= size:
-            return f"{seconds / {'days': 86400.0, 'h': 3600.0, 'min': 60.0}[unit]:,.0f} {unit}"
-    return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from tilestamp.experiments.harness.pool import Pool, pool
+from tilestamp.experiments.harness.telling import duration, so_far
 from tilestamp.experiments.studies.axes import shown
 from tilestamp.experiments.studies.cells import MOST_LISTED, candidates, missing, rows
 from tilestamp.experiments.studies.design import Design
-from tilestamp.experiments.studies.forecast import Forecast, count, duration, forecast_of
+from tilestamp.experiments.studies.forecast import Forecast, count, forecast_of
 from tilestamp.experiments.studies.forecast import forecast as forecast_study
 from tilestamp.experiments.studies.names import Names
 from tilestamp.experiments.studies.parameters import Resolver
@@ -66,7 +67,7 @@ def run_study(
     groups, expected = _first(study, resolver, jobs)
     summary.changed = _changed(study, resolver)
     if expected.todo or len(study.errors) > 1:
-        with pool(jobs or expected.jobs, cluster) as workers:
+        with pool(jobs or expected.jobs, cluster, say) as workers:
             runner = _Runner(study, workers, summary, say, expected.todo, resolver)
             runner.run(groups)
             for error in study.errors[1:]:
@@ -161,5 +162,4 @@ class _Runner:
         now = time.perf_counter()
         if now - self._said >= OFTEN and summary.new < self.todo:
             self._said = now
-            left = (now - self._begin) / summary.new * (self.todo - summary.new) if summary.new else 0.0
-            self._say(f"{summary.new:,} of {self.todo:,} cells, about {duration(left)} left")
+            self._say(so_far(summary.new, self.todo, now - self._begin, " cells"))
