@@ -1,6 +1,5 @@
 """One sub-triangle: snapping, culls, and the header and data record that later stages read (cudaraster 1.1, setup)."""
 
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,13 +17,9 @@ _DEPTH_SCALE = np.float32(2147465984.0)  # half the depth range
 _DEPTH_BASE = np.float32(2147483648.0)
 _LOW = 0xFFFFFFFF
 
-
-class Outcome(IntEnum):
-    """What became of a triangle before it is stored."""
-
-    KEPT = 0
-    BACKFACE = 1  # or without area
-    BETWEEN = 2  # its box holds no sample, or it misses the one or two that the box holds
+KEPT, BACKFACE, BETWEEN, CLIPPED, OUTSIDE, ABSENT = range(6)
+"""What became of a triangle: drawn whole, turned away or without area, its box holds no sample or it misses the one or
+two that the box holds, clipped, outside one view plane, an index out of range."""
 
 
 class View(NamedTuple):
@@ -44,66 +39,71 @@ class View(NamedTuple):
 class Corner(NamedTuple):
     """A vertex of a sub-triangle: scalars only, so that compiled code keeps it in registers."""
 
-    x: np.float32  # clip space
-    y: np.float32
-    z: np.float32
-    w: np.float32
+    sx: Any  # snapped, 1/16 pixel from the viewport's centre
+    sy: Any
+    inverse_w: np.float32
+    depth: np.float32
+    w: np.float32  # clip space
     u: np.float32  # barycentrics towards vertices 1 and 2 of the input triangle
     v: np.float32
-    inverse_w: np.float32
-    sx: int  # snapped, 1/16 pixel from the viewport's centre
-    sy: int
+
+
+@kernel(error_model="numpy")
+def snapped(x: Any, y: Any, inverse_w: Any, view: View) -> Any:
+    """Project a clip position to the screen and round it to 1/16 pixel."""
+    return round_to_int32((x * inverse_w) * view.scale_x), round_to_int32((y * inverse_w) * view.scale_y)
+
+
+@kernel(error_model="numpy")
+def depth_at(z: Any, inverse_w: Any) -> Any:
+    """Depth of a clip position, float32 in depth units."""
+    return fma(z * _DEPTH_SCALE, inverse_w, _DEPTH_BASE)
 
 
 @kernel(error_model="numpy")
 def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
-    """Project a clip position to the screen and round it to 1/16 pixel."""
+    """Make a corner of a clip position."""
     inverse = np.float32(1) / w
-    sx = round_to_int32((x * inverse) * view.scale_x)
-    sy = round_to_int32((y * inverse) * view.scale_y)
-    return Corner(x, y, z, w, u, v, inverse, sx, sy)
+    sx, sy = snapped(x, y, inverse, view)
+    return Corner(sx, sy, inverse, depth_at(z, inverse), w, u, v)
 
 
 @kernel
-def snapped_area(a: Corner, b: Corner, c: Corner) -> Any:
-    """Twice the area in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it."""
-    return wrap_int32((b.sx - a.sx) * (c.sy - a.sy) - (b.sy - a.sy) * (c.sx - a.sx))
-
-
-@kernel
-def _holds_site(a: Corner, b: Corner, c: Corner, x: int, y: int, sign: int) -> Any:
-    ax, ay, bx, by, cx, cy = a.sx - x, a.sy - y, b.sx - x, b.sy - y, c.sx - x, c.sy - y
+def _holds_site(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, x: int, y: int, sign: int) -> Any:
+    ax, bx, cx, ay, by, cy = ax - x, bx - x, cx - x, ay - y, by - y, cy - y
     ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
 
 
 @kernel
-def _between_samples(a: Corner, b: Corner, c: Corner, view: View, sign: int) -> Any:
+def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View, sign: int) -> Any:
     """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
     q = SUBPIXELS >> view.log_samples
-    bx, by = view.half_width - q // 2, view.half_height - q // 2
-    lox = wrap_int32(min(a.sx, b.sx, c.sx) + q - 1 + bx) & -q
-    hix = wrap_int32(max(a.sx, b.sx, c.sx) + bx) & -q
-    loy = wrap_int32(min(a.sy, b.sy, c.sy) + q - 1 + by) & -q
-    hiy = wrap_int32(max(a.sy, b.sy, c.sy) + by) & -q
-    if lox > hix or loy > hiy:
+    x, y = view.half_width - q // 2, view.half_height - q // 2
+    low_x, high_x = wrap_int32(min(ax, bx, cx) + q - 1 + x) & -q, wrap_int32(max(ax, bx, cx) + x) & -q
+    low_y, high_y = wrap_int32(min(ay, by, cy) + q - 1 + y) & -q, wrap_int32(max(ay, by, cy) + y) & -q
+    if low_x > high_x or low_y > high_y:
         return True, 0
-    spread = (hix - lox) + (hiy - loy)
+    spread = (high_x - low_x) + (high_y - low_y)
     if spread > q:
         return False, 0
-    if spread == 0 or _holds_site(a, b, c, lox - bx, loy - by, sign):
-        return not _holds_site(a, b, c, lox - bx, loy - by, sign), 1
-    return not _holds_site(a, b, c, hix - bx, hiy - by, sign), 2
+    holds = _holds_site(ax, ay, bx, by, cx, cy, low_x - x, low_y - y, sign)
+    if spread == 0 or holds:
+        return not holds, 1
+    return not _holds_site(ax, ay, bx, by, cx, cy, high_x - x, high_y - y, sign), 2
 
 
 @kernel
-def cull(a: Corner, b: Corner, c: Corner, view: View) -> Any:
-    """Outcome of the culls that follow snapping, the signed area, and the sample sites that were looked at."""
-    area = snapped_area(a, b, c)
+def cull(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View) -> Any:
+    """Outcome of the culls that follow snapping, twice the area, and the sample sites that were looked at.
+
+    The area is in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it.
+    """
+    area = wrap_int32((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
     if area == 0 or (area < 0 and view.cull_backfaces):
-        return 1, area, 0
-    between, sites = _between_samples(a, b, c, view, 1 if area > 0 else -1)
-    return 2 if between else 0, area, sites
+        return BACKFACE, area, 0
+    between, sites = _between_samples(ax, ay, bx, by, cx, cy, view, 1 if area > 0 else -1)
+    return BETWEEN if between else KEPT, area, sites
 
 
 @kernel
@@ -127,11 +127,6 @@ def _lesser(a: Any, b: Any) -> Any:
 
 
 @kernel(error_model="numpy")
-def _depth_at(a: Corner) -> Any:
-    return fma(a.z * _DEPTH_SCALE, a.inverse_w, _DEPTH_BASE)
-
-
-@kernel(error_model="numpy")
 def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
     headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)
@@ -139,7 +134,7 @@ def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc
     headers[slot, 4], headers[slot, 5] = np.int16(c.sx & 0xFFFF), np.int16(c.sy & 0xFFFF)
     word = np.int64(_flips(a, b) << 8 | _flips(b, c) << 4 | _flips(c, a))
     if view.depth:
-        nearest = _lesser(_lesser(_depth_at(a), _depth_at(b)), _depth_at(c))
+        nearest = _lesser(_lesser(a.depth, b.depth), c.depth)
         word |= round_to_uint32(nearest - np.float32(DEPTH_ERROR << view.log_samples)) & 0xFFFFF000
     misc[slot] = np.uint32(word)
 
@@ -152,7 +147,7 @@ def store_depth_plane(
     s = view.log_samples
     half = 1 << (3 - s)
     zx, zy, zb = plane_equation(
-        _depth_at(a), _depth_at(b), _depth_at(c), a.sx + view.half_width - half, a.sy + view.half_height - half,
+        a.depth, b.depth, c.depth, a.sx + view.half_width - half, a.sy + view.half_height - half,
         b.sx - a.sx, b.sy - a.sy, c.sx - a.sx, c.sy - a.sy, mantissa, shift, s,
     )  # fmt: skip
     planes[slot, 0], planes[slot, 1], planes[slot, 2] = np.uint32(zx), np.uint32(zy), np.uint32(zb)

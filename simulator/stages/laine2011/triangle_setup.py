@@ -15,23 +15,26 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow
-from tilestamp.simulator.stages.laine2011.subtriangle import View
+from tilestamp.simulator.stages.laine2011.screen_vertices import BEYOND, Screen, screen_vertices
+from tilestamp.simulator.stages.laine2011.subtriangle import ABSENT, CLIPPED, KEPT, View
 from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
+    FIRST_OUTSIDE,
+    ONE_SITE,
+    TWO_SITES,
+    WARP,
     TriangleSetupEvent,
-    count_lane,
-    count_paths,
+    count_clipped,
+    count_vertices,
     count_warp,
     new_counting,
 )
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
-    CLIPPED,
-    OUTSIDE,
     Scratch,
     Setup,
     clip_and_store,
-    fast_path,
-    load_corners,
     new_scratch,
+    store_whole,
+    whole_outcome,
 )
 from tilestamp.simulator.stages.laine2011.triangle_setup_streams import setup_streams
 from tilestamp.simulator.work import Work
@@ -39,7 +42,6 @@ from tilestamp.simulator.work import Work
 Release = Literal["1.1", "nvdiffrast"]
 
 BLOCK = 64  # threads, a triangle each
-WARP = 32
 SHARED_BYTES = 4608  # the clip polygons of 64 threads
 SLACK = 4096  # sub-triangle slots beyond one for each triangle, at first
 MAX_SUBTRIANGLES = 2**24
@@ -52,6 +54,7 @@ _PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
 def _setup_range(
     begin: int,
     end: int,
+    screen: Screen,
     positions: Any,
     triangles: Any,
     view: View,
@@ -59,58 +62,67 @@ def _setup_range(
     out: Setup,
     scratch: Scratch,
     counting: Any,
+    vertices: Any,
     table: Any,
 ) -> None:
     """All triangles of some whole blocks; those with two or more sub-triangles are only counted here."""
-    clip = scratch.clip
     for warp in range(begin, end, WARP):
         last = min(warp + WARP, end)
-        allocating = np.int64(0)  # a literal that changes in a loop has its callees compiled twice
-        if table is not None:
-            counting.longest[:] = 0
-            counting.paths[:] = 0
         for t in range(warp, last):
-            out.first[t] = t
-            kept, fan, outcome, sites = 0, 0, OUTSIDE, 0
-            in_range = load_corners(positions, triangles, t, clip)
-            if in_range:
-                outcome, sites = fast_path(clip, view, out, t, triangles)
-                kept = 1 if outcome == 0 else 0
-            if outcome == CLIPPED:
-                kept, fan = clip_and_store(scratch, view, out, -1, t, triangles)
-                allocating += 1 if kept >= 2 else 0
-            out.subtriangles[t] = kept
+            outcome, area, sites = whole_outcome(screen, triangles, t, view)
+            kept = fan = 0
+            if outcome == KEPT:
+                kept = 1
+                store_whole(screen, positions, triangles, t, area, view, out)
+            elif outcome == CLIPPED:
+                kept, fan = clip_and_store(scratch, positions, view, out, np.int64(-1), t, triangles)
+            out.first[t], out.subtriangles[t] = t, kept
             if table is not None:
-                counting.read[t - warp] = in_range
-                count_lane(table[warp // BLOCK], counting, outcome, kept, fan, scratch.steps)
-                count_paths(counting.paths, clip, in_range, outcome, sites, scratch.steps)
+                bit = 1 << (t - warp)
+                counting.lanes[outcome] |= bit
+                if sites > 0:
+                    counting.lanes[ONE_SITE] |= bit
+                    counting.lanes[TWO_SITES] |= bit if sites > 1 else 0
+                if outcome == CLIPPED:
+                    count_clipped(counting, bit, kept, fan, scratch.steps)
+                if outcome != ABSENT and screen.codes[triangles[t, 0]] & BEYOND:
+                    counting.lanes[FIRST_OUTSIDE] |= bit
         if table is not None:
             row = table[warp // BLOCK]
-            count_warp(row, allocating, counting, triangles, warp, last - warp, view, out, simt)
+            count_vertices(row, vertices, counting, triangles, warp, last - warp, warp // BLOCK, simt)
+            count_warp(row, counting, last - warp, view, out, simt)
 
 
 @kernel
 def _setup_part(
-    part: int, parts: int, positions: Any, triangles: Any, view: View, simt: Simt, out: Setup, table: Any
+    part: int,
+    parts: int,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    simt: Simt,
+    out: Setup,
+    vertices: Any,
+    table: Any,
 ) -> None:
     """Take a share of the blocks, through arrays without reference counts."""
     blocks = (triangles.shape[0] + BLOCK - 1) // BLOCK
     begin, end = blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles.shape[0])
     scratch, counting = new_scratch(), new_counting()
-    positions, triangles, out, lent = borrow(positions), borrow(triangles), borrow(out), borrow(scratch)
-    _setup_range(begin, end, positions, triangles, view, simt, out, lent, borrow(counting), borrow(table))
-    scratch.steps[0] = counting.value[0] = 0  # the owners live to here
+    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
+    lent, counted = borrow(scratch), (borrow(counting), borrow(vertices[part]))
+    _setup_range(begin, end, screen, positions, triangles, view, simt, out, lent, *counted, borrow(table))
+    scratch.steps[0] = counting.most[0] = 0  # the owners live to here
 
 
 @kernel
 def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out: Setup) -> None:
     """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
     scratch = new_scratch()
-    clip = scratch.clip
     for t in several:
-        load_corners(positions, triangles, t, clip)
         out.misc[t] = out.first[t]
-        clip_and_store(scratch, view, out, out.first[t], t, triangles)
+        clip_and_store(scratch, positions, view, out, np.int64(out.first[t]), t, triangles)
 
 
 def as_published(switch: bool | None, release: Release) -> bool:
@@ -234,8 +246,12 @@ def triangle_setup(
     out = _empty_setup(F, F, release)
     table = np.zeros((-(-F // BLOCK) if counting else 0, len(TriangleSetupEvent)), np.int64)
     with np.errstate(all="ignore"):
+        screen = screen_vertices(positions, triangles, view)
         parts = parts_of(-(-F // BLOCK), _PART_BLOCKS)
-        for_parts(_setup_part, parts, positions, triangles, view, simt, out, table if counting else None)
+        vertices = np.zeros((parts, 2), np.int64)
+        for_parts(
+            _setup_part, parts, screen, positions, triangles, view, simt, out, vertices, table if counting else None
+        )
         several = np.flatnonzero(out.subtriangles >= 2)
         counts = out.subtriangles[several].astype(np.int64)
         needed = F + int(counts.sum())
@@ -244,7 +260,9 @@ def triangle_setup(
             out = _grown(out, needed)
             out.first[several] = F + np.cumsum(counts) - counts
             _setup_several(several, positions, triangles, view, out)
-    streams = setup_streams(positions, triangles, out, view, BLOCK)
+    facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
+    if not counting:
+        return StageResult(out, (), facts)
     work = Work(
         stage="triangle_setup",
         kernel="triangleSetup",
@@ -253,11 +271,10 @@ def triangle_setup(
         grid=-(-F // BLOCK),
         block=BLOCK,
         shared_bytes=SHARED_BYTES,
-        streams=streams,
+        streams=setup_streams(out, len(positions), vertices.sum(axis=0), view),
         variant=variant,
     )
-    facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
-    return StageResult(out, (work,) if counting else (), facts)
+    return StageResult(out, (work,), facts)
 
 
 def _empty_setup(F: int, slots: int, release: Release) -> Setup:

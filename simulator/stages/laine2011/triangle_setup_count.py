@@ -6,14 +6,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import transactions
+from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stages.laine2011.subtriangle import View
-from tilestamp.simulator.stages.laine2011.triangle_setup_paths import CLIPPED, OUTSIDE, WARP, Setup
+from tilestamp.simulator.stages.laine2011.exact import popcount
+from tilestamp.simulator.stages.laine2011.subtriangle import (
+    ABSENT,
+    BACKFACE,
+    BETWEEN,
+    CLIPPED,
+    KEPT,
+    OUTSIDE,
+    View,
+)
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
+WARP = 32
 INDEX_BYTES, POSITION_BYTES, HEADER_BYTES = 12, 16, 16
 RECORD_PARTS = 4  # of 16 bytes, in release 1.1
+FIRST_OUTSIDE, ONE_SITE, TWO_SITES, SINGLE, SEVERAL = range(ABSENT + 1, ABSENT + 6)
 
 
 class TriangleSetupEvent(IntEnum):
@@ -54,26 +65,18 @@ class TriangleSetupEvent(IntEnum):
 
 
 _E = TriangleSetupEvent
-_ACCESSES = 12  # three indices and three positions, loaded; count, header and four parts of a record, stored
-_LOADS = 6
-_STEP_COLUMNS = np.array([_E.SNAP_WARPS, _E.STORE_STEPS, _E.CLIP_WARPS, *[_E.CLIP_STEPS] * 6, _E.FAN_STEPS])
-"""Columns of what the longest lane of a warp decides."""
-
-_LANE_COLUMNS = np.array([_E.SNAP_LANES, _E.STORE_LANES, _E.CLIP_LANES, *[_E.CLIP_STEP_LANES] * 6, _E.FAN_LANES])
-"""Columns of the lanes in each of them."""
-
-_PATH_WARPS = np.array([_E.OUTSIDE_WARPS, _E.CULLED_WARPS, _E.SITE_WARPS])
+_KEPT, _FAN, _STEPS = 0, 1, 2  # columns of ``Counting.most``: sub-triangles, fan, vertices walked at each of six planes
+_SEEN = 512  # places of a table of what a block has read: more than the 192 vertices that it can ask for
 
 
 class Counting(NamedTuple):
-    """What counting remembers from lane to lane and from warp to warp."""
+    """What counting remembers of a warp and of a block."""
 
-    value: NDArray[np.int64]  # (10,) steps of the lane in hand, by ``_STEP_COLUMNS``
-    longest: NDArray[np.int64]  # (10,) maxima over the warp
-    lanes: NDArray[np.int64]  # (32,) addresses
-    read: NDArray[np.bool_]  # (32,) triangles with indices in range
-    paths: NDArray[np.int64]  # (8,) lanes of the warp on each branch: see ``count_paths``
-    regular: NDArray[np.int64]  # (12, 2) transactions and bytes of accesses that are the same for all full warps
+    lanes: NDArray[np.int64]  # (11,) lanes of the warp, a bit each, by outcome, site, and sub-triangles written
+    most: NDArray[np.int64]  # (8,) of the clipped lanes of the warp, the longest
+    total: NDArray[np.int64]  # (8,) and their sum
+    sectors: NDArray[np.int64]  # (512, 2) sectors of vertices that the block has read, and which loads of it did
+    lines: NDArray[np.int64]  # (512, 2) and lines
 
 
 @kernel
@@ -81,119 +84,151 @@ def new_counting() -> Any:
     """Allocate what one worker counts with."""
     i64 = np.int64
     return Counting(
-        np.zeros(_STEP_COLUMNS.size, i64), np.zeros(_STEP_COLUMNS.size, i64), np.empty(WARP, i64),
-        np.zeros(WARP, np.bool_), np.zeros(8, i64), np.zeros((_ACCESSES, 2), i64),
+        np.zeros(ABSENT + 6, i64), np.zeros(8, i64), np.zeros(8, i64), np.zeros((_SEEN, 2), i64),
+        np.zeros((_SEEN, 2), i64),
     )  # fmt: skip
 
 
 @kernel
-def count_lane(row: Any, counting: Counting, outcome: int, kept: int, fan: int, steps: Any) -> None:
-    """Count one thread; ``counting.longest`` holds the warp's maxima so far."""
-    row[_E.TRIANGLE_LANES] += 1
-    if outcome == OUTSIDE:
-        row[_E.VIEWPORT_CULLED] += 1
-        return
-    value, longest = counting.value, counting.longest
-    value[0], value[1], value[2], value[9] = 1, kept, 1, fan
-    columns = 2  # snap and store
-    if outcome > 0:
-        row[_E.BACKFACE_CULLED if outcome == 1 else _E.BETWEEN_CULLED] += 1
-    elif outcome < 0:
-        columns = _STEP_COLUMNS.size
-        for p in range(6):
-            value[3 + p] = steps[p]
-        if kept >= 2:
-            row[_E.ATOMIC_LANES] += 1
-            row[_E.STORE_TRANSACTIONS] += 2 * kept + 1  # header and record in slots of its own, and where those are
-            row[_E.STORE_BYTES] += 32 * (2 * kept + 1)
-    for i in range(columns):
-        row[_LANE_COLUMNS[i]] += value[i]
-        row[_STEP_COLUMNS[i]] += max(value[i] - longest[i], 0)
-        longest[i] = max(longest[i], value[i])
+def count_clipped(counting: Counting, bit: int, kept: int, fan: int, steps: Any) -> None:
+    """Note a clipped lane."""
+    lanes, most, total = counting.lanes, counting.most, counting.total
+    lanes[SINGLE] |= bit if kept == 1 else 0
+    lanes[SEVERAL] |= bit if kept > 1 else 0
+    for i in range(8):
+        value = kept if i == _KEPT else fan if i == _FAN else steps[i - _STEPS]
+        most[i] = max(most[i], value)
+        total[i] += value
 
 
 @kernel
-def count_paths(paths: Any, corners: Any, in_range: bool, outcome: int, sites: int, steps: Any) -> None:
-    """Note the branches of one thread: first vertex outside, culled, one site, two, clips along x, y, z, no clip."""
-    w = corners[0, 3]
-    paths[0] += in_range and (w < abs(corners[0, 0]) or w < abs(corners[0, 1]) or w < abs(corners[0, 2]))
-    paths[1] += outcome == OUTSIDE
-    paths[2] += sites > 0
-    paths[3] += sites > 1
-    paths[7] += outcome >= 0
-    if outcome == CLIPPED:
-        for axis in range(3):
-            paths[4 + axis] += steps[2 * axis] > 0
+def _lanes(mask: Any) -> Any:
+    return popcount(np.uint64(mask))
 
 
 @kernel
-def _address_lanes(access: int, counting: Counting, triangles: Any, t0: int, n: int, view: View, out: Setup) -> Any:
-    """Find the addresses of an access by n lanes from triangle t0 on; returns bytes a lane, 0 where it is left out.
-
-    Of a record of 1.1 the first 16 bytes are written for depth alone, the middle 32 for interpolation alone.
-    """
-    lanes, k, part = counting.lanes, access % 3, access - _LOADS - 2
-    words = out.planes.shape[1] // 4
-    if access < 3:
-        for i in range(n):
-            lanes[i] = (t0 + i) * INDEX_BYTES + 4 * k
-        return 4
-    if access < _LOADS:
-        for i in range(n):
-            lanes[i] = np.int64(triangles[t0 + i, k]) * POSITION_BYTES if counting.read[i] else -1
-        return POSITION_BYTES
-    if part == -2:
-        for i in range(n):
-            lanes[i] = t0 + i
-        return 1
-    if part == -1:
-        for i in range(n):
-            lanes[i] = (t0 + i) * HEADER_BYTES if out.subtriangles[t0 + i] > 0 else -1
-        return HEADER_BYTES
-    if part >= words or (words == RECORD_PARTS and part < 3 and not (view.interpolate if part else view.depth)):
-        return 0
-    for i in range(n):
-        lanes[i] = (t0 + i) * HEADER_BYTES * words + 16 * part if out.subtriangles[t0 + i] == 1 else -1
-    return HEADER_BYTES
+def _groups(mask: Any, size: int) -> Any:
+    """Aligned groups of ``size`` lanes, a power of two, with a lane in the mask."""
+    step = 1
+    while step < size:
+        mask |= mask >> step
+        step *= 2
+    return _lanes(mask & (0xFFFFFFFF // ((1 << size) - 1)))
 
 
 @kernel
-def count_warp(
-    row: Any, allocating: int, counting: Counting, triangles: Any, t0: int, n: int, view: View, out: Setup, simt: Simt
+def _note(seen: Any, mark: int, key: int, load: int) -> Any:
+    """Note that a load touches a segment; returns the loads of the block that had touched it before, a bit each."""
+    at, wanted = key & (_SEEN - 1), mark << 32 | key
+    while seen[at, 0] != wanted:
+        if seen[at, 0] >> 32 != mark:  # free: what stands here is an earlier block's
+            seen[at, 0], seen[at, 1] = wanted, 0
+            break
+        at = (at + 1) & (_SEEN - 1)
+    before = seen[at, 1]
+    seen[at, 1] = before | load
+    return before
+
+
+@kernel
+def count_vertices(
+    row: Any, vertices: Any, counting: Counting, triangles: Any, t0: int, n: int, block: int, simt: Simt
 ) -> None:
-    """Count what the warp of n triangles from t0 on does to memory."""
+    """Count the loads of a warp's vertices, a corner of each triangle at a time, 16 bytes a lane.
+
+    ``vertices`` adds up what the streams say: sectors, each once a block, and lines, each once a load.
+    """
+    segment = smallest_transaction_bytes(simt.coalescing)
+    eights, count = segment != SECTOR_BYTES, 0  # lines are loaded by eight lanes at a time
+    for corner in range(3):
+        first = 1 << (12 * (t0 // WARP % 2) + 4 * corner)  # bit of the warp's first eight lanes
+        whole = 15 * first
+        last: Any = -1
+        before: Any = -1
+        for lane in range(n):
+            load = first << (lane >> 3)
+            if lane & 7 == 0:
+                last = before = -1
+            sector = np.int64(triangles[t0 + lane, corner]) * POSITION_BYTES // SECTOR_BYTES
+            if sector in (last, before) or counting.lanes[ABSENT] >> lane & 1:
+                continue  # most vertices are those of a neighbour
+            before, last = last, sector
+            earlier = _note(counting.sectors, block + 1, sector, load)
+            vertices[0] += earlier == 0
+            lines = _note(counting.lines, block + 1, sector >> 2, load)
+            vertices[1] += lines & whole == 0
+            count += lines & load == 0 if eights else earlier & whole == 0
+    row[_E.LOAD_TRANSACTIONS] += count
+    row[_E.LOAD_BYTES] += count * segment
+
+
+@kernel
+def _count_lanes(row: Any, counting: Counting, n: int) -> None:
+    """Count the branches that the lanes of a warp take."""
+    lanes, most, total = counting.lanes, counting.most, counting.total
+    outside, clipped = lanes[OUTSIDE] | lanes[ABSENT], lanes[CLIPPED]
+    fast = lanes[KEPT] | lanes[BACKFACE] | lanes[BETWEEN]
+    snapped = n - _lanes(outside)
     row[_E.WARPS] += 1
-    paths = counting.paths
-    for i in range(3):
-        row[_PATH_WARPS[i]] += paths[i] > 0
-        row[_E.CLIP_AXES] += paths[4 + i] > 0
-    row[_E.SITE_LANES] += paths[2]
-    row[_E.RETEST_WARPS] += paths[3] > 0
-    row[_E.FAST_WARPS] += paths[7] > 0
-    row[_E.FAST_LANES] += paths[7]
-    if allocating > 0:
-        row[_E.ATOMIC] += 1
-        row[_E.ATOMIC_REQUESTS] += allocating  # lanes at one address are not merged
-        row[_E.ATOMIC_CONFLICTS] += allocating - 1
-        row[_E.ATOMIC_DEPTH] += allocating
-    storing = 0
-    for t in range(t0, t0 + n):
-        storing += out.subtriangles[t] == 1
-    for access in range(_ACCESSES):
-        is_regular = n == WARP and (access < 3 or access == _LOADS or (access > _LOADS and storing == WARP))
-        known = counting.regular[access]
-        if not (is_regular and known[0] > 0):
-            size = _address_lanes(access, counting, triangles, t0, n, view, out)
-            if size == 0:
-                continue
-            count, moved = transactions(counting.lanes, n, size, simt.coalescing)
-            if is_regular:
-                known[0], known[1] = count, moved
-        else:
-            count, moved = known[0], known[1]
-        if access < _LOADS:
-            row[_E.LOAD_TRANSACTIONS] += count
-            row[_E.LOAD_BYTES] += moved
-        else:
-            row[_E.STORE_TRANSACTIONS] += count
-            row[_E.STORE_BYTES] += moved
+    row[_E.TRIANGLE_LANES] += n
+    row[_E.VIEWPORT_CULLED] += n - snapped
+    row[_E.CULLED_WARPS] += outside > 0
+    row[_E.OUTSIDE_WARPS] += lanes[FIRST_OUTSIDE] > 0
+    row[_E.SNAP_WARPS] += snapped > 0
+    row[_E.SNAP_LANES] += snapped
+    row[_E.BACKFACE_CULLED] += _lanes(lanes[BACKFACE])
+    row[_E.BETWEEN_CULLED] += _lanes(lanes[BETWEEN])
+    row[_E.FAST_WARPS] += fast > 0
+    row[_E.FAST_LANES] += _lanes(fast)
+    row[_E.SITE_WARPS] += lanes[ONE_SITE] > 0
+    row[_E.SITE_LANES] += _lanes(lanes[ONE_SITE])
+    row[_E.RETEST_WARPS] += lanes[TWO_SITES] > 0
+    row[_E.STORE_STEPS] += max(most[_KEPT], lanes[KEPT] > 0)
+    row[_E.STORE_LANES] += _lanes(lanes[KEPT]) + total[_KEPT]
+    if clipped == 0:
+        return
+    row[_E.CLIP_WARPS] += 1
+    row[_E.CLIP_LANES] += _lanes(clipped)
+    row[_E.FAN_STEPS] += most[_FAN]
+    row[_E.FAN_LANES] += total[_FAN]
+    for plane in range(6):
+        row[_E.CLIP_STEPS] += most[_STEPS + plane]
+        row[_E.CLIP_STEP_LANES] += total[_STEPS + plane]
+        row[_E.CLIP_AXES] += plane % 2 == 0 and most[_STEPS + plane] > 0
+    several = _lanes(lanes[SEVERAL])
+    row[_E.ATOMIC] += several > 0
+    row[_E.ATOMIC_LANES] += several
+    row[_E.ATOMIC_REQUESTS] += several  # lanes at one address are not merged
+    row[_E.ATOMIC_CONFLICTS] += max(several - 1, 0)
+    row[_E.ATOMIC_DEPTH] += several
+    own = (
+        2 * (total[_KEPT] - _lanes(lanes[SINGLE])) + several
+    )  # headers and records in slots beyond, and where those are
+    row[_E.STORE_TRANSACTIONS] += own
+    row[_E.STORE_BYTES] += SECTOR_BYTES * own
+
+
+@kernel
+def count_warp(row: Any, counting: Counting, n: int, view: View, out: Setup, simt: Simt) -> None:
+    """Count a warp of n triangles, its vertices apart, and forget its lanes.
+
+    Indices and counts stand side by side; a header has 16 bytes, a record as many, or in 1.1 four times as many, of
+    which the first part is written for depth alone, the middle two for interpolation alone.
+    """
+    lanes, segment = counting.lanes, smallest_transaction_bytes(simt.coalescing)
+    _count_lanes(row, counting, n)
+    indices = 0
+    for k in range(3):
+        indices += (INDEX_BYTES * (n - 1) + 4 * k) // segment + 1  # those of a warp begin a line
+    row[_E.LOAD_TRANSACTIONS] += indices
+    row[_E.LOAD_BYTES] += indices * segment
+    single = lanes[KEPT] | lanes[SINGLE]
+    parts = 1 if out.planes.shape[1] < 4 * RECORD_PARTS else 1 + view.depth + 2 * view.interpolate
+    stores = (n - 1) // segment + 1 + _groups(single | lanes[SEVERAL], segment // HEADER_BYTES)
+    stores += parts * _groups(single, max(segment // (4 * out.planes.shape[1]), 1))
+    row[_E.STORE_TRANSACTIONS] += stores
+    row[_E.STORE_BYTES] += stores * segment
+    if lanes[CLIPPED]:
+        counting.most[:] = 0
+        counting.total[:] = 0
+    lanes[:] = 0

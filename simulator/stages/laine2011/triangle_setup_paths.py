@@ -1,4 +1,4 @@
-"""Triangle setup, one thread: the fast path of a triangle inside the frustum, and the clipper's path."""
+"""Triangle setup, one thread: a triangle that is drawn whole, and one that is clipped."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.clipper import MAX_VERTICES, between, clip_triangle
 from tilestamp.simulator.stages.laine2011.plane_equation import reciprocal_area
+from tilestamp.simulator.stages.laine2011.screen_vertices import BEYOND, CLIP, Screen
 from tilestamp.simulator.stages.laine2011.subtriangle import (
+    ABSENT,
+    CLIPPED,
+    KEPT,
+    OUTSIDE,
     Corner,
     View,
     cull,
@@ -19,9 +24,6 @@ from tilestamp.simulator.stages.laine2011.subtriangle import (
 )
 
 GUARD_BAND = 32767  # 1/16 pixel; the largest span, too, that the coverage tables allow
-WARP = 32
-CLIPPED = -1  # outcome of the fast path: go to the clipper
-OUTSIDE = -2  # outside one view plane
 
 
 class Setup(NamedTuple):
@@ -57,47 +59,6 @@ def new_scratch() -> Any:
         np.empty((3, 4), f32), np.empty((MAX_VERTICES, 2), f32), np.empty((MAX_VERTICES, 2), f32), np.empty(3, f32),
         np.zeros(6, np.int64),
     )  # fmt: skip
-
-
-@kernel
-def _beyond(x0: Any, w0: Any, x1: Any, w1: Any, x2: Any, w2: Any) -> Any:
-    """Whether three corners lie beyond one of the two view planes of an axis."""
-    return (w0 < x0 and w1 < x1 and w2 < x2) or (w0 < -x0 and w1 < -x1 and w2 < -x2)
-
-
-@kernel
-def _outside(c: Any) -> Any:
-    """Whether all corners lie beyond one view plane (only looked at where the first corner is outside)."""
-    w0, w1, w2 = c[0, 3], c[1, 3], c[2, 3]
-    if not (w0 < abs(c[0, 0]) or w0 < abs(c[0, 1]) or w0 < abs(c[0, 2])):
-        return False
-    return (
-        _beyond(c[0, 0], w0, c[1, 0], w1, c[2, 0], w2)
-        or _beyond(c[0, 1], w0, c[1, 1], w1, c[2, 1], w2)
-        or _beyond(c[0, 2], w0, c[1, 2], w1, c[2, 2], w2)
-    )
-
-
-@kernel
-def _inside(clip: Any, first_axis: int) -> Any:
-    """Whether no corner leaves the frustum along the axes from ``first_axis`` on; a NaN among numbers is ignored."""
-    for k in range(3):
-        seen = False
-        w = clip[k, 3]
-        for axis in range(first_axis, 3):
-            magnitude = abs(clip[k, axis])
-            if w < magnitude:
-                return False
-            seen |= magnitude >= np.float32(0)
-        if not seen or w != w:  # noqa: PLR0124 - NaN
-            return False
-    return True
-
-
-@kernel
-def _in_guard_band(a: Corner, b: Corner, c: Corner) -> Any:
-    low, high = min(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy), max(a.sx, b.sx, c.sx, a.sy, b.sy, c.sy)
-    return low >= -GUARD_BAND - 1 and high <= GUARD_BAND and high - low <= GUARD_BAND
 
 
 @kernel
@@ -138,8 +99,8 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
     a = b = _fan_corner(clip, polygon, np.int64(0), view)  # a literal index would be compiled by itself
     for i in range(1, n):
         c = _fan_corner(clip, polygon, i, view)
-        outcome, area, _ = cull(a, b, c, view)
-        if i >= 2 and outcome == 0:
+        outcome, area, _ = cull(a.sx, a.sy, b.sx, b.sy, c.sx, c.sy, view)
+        if i >= 2 and outcome == KEPT:
             if slot >= 0:
                 _store(a, b, c, area, view, out, slot + kept, t, triangles)
             kept += 1
@@ -148,43 +109,49 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
 
 
 @kernel
-def load_corners(positions: Any, triangles: Any, t: int, clip: Any) -> Any:
-    """Fetch the three corners; False where an index is out of range."""
-    for k in range(3):
-        v = triangles[t, k]
-        if v < 0 or v >= positions.shape[0]:
-            return False
-        for c in range(4):
-            clip[k, c] = positions[v, c]
-    return True
+def whole_outcome(screen: Screen, triangles: Any, t: int, view: View) -> Any:
+    """Outcome of a triangle if it needs no clipping (``CLIPPED`` if it does), its area, and the sites looked at."""
+    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    if min(i, j, k) < 0 or max(i, j, k) >= screen.codes.size:
+        return ABSENT, 0, 0
+    p, q, r = screen.codes[i], screen.codes[j], screen.codes[k]
+    if p & q & r & BEYOND:
+        return OUTSIDE, 0, 0
+    if (p | q | r) & CLIP:
+        return CLIPPED, 0, 0
+    ax, bx, cx = np.int64(screen.places[i, 0]), np.int64(screen.places[j, 0]), np.int64(screen.places[k, 0])
+    ay, by, cy = np.int64(screen.places[i, 1]), np.int64(screen.places[j, 1]), np.int64(screen.places[k, 1])
+    if view.guard_band:
+        low, high = min(ax, bx, cx, ay, by, cy), max(ax, bx, cx, ay, by, cy)
+        if low < -GUARD_BAND - 1 or high > GUARD_BAND or high - low > GUARD_BAND:
+            return CLIPPED, 0, 0
+    return cull(ax, ay, bx, by, cx, cy, view)
 
 
 @kernel
-def fast_path(clip: Any, view: View, out: Setup, t: int, triangles: Any) -> Any:
-    """Outcome of a triangle that needs no clipping (CLIPPED where it does), and the sample sites looked at.
+def _corner(screen: Screen, positions: Any, i: int, u: Any, v: Any) -> Any:
+    """Make a corner of an input vertex."""
+    place, ratio = screen.places[i], screen.ratios[i]
+    return Corner(np.int64(place[0]), np.int64(place[1]), ratio[0], ratio[1], positions[i, 3], u, v)
 
-    A kept triangle is written to its own slot.
-    """
-    if _outside(clip):
-        return OUTSIDE, 0
-    if not _inside(clip, 2 if view.guard_band else 0):
-        return CLIPPED, 0
+
+@kernel
+def store_whole(screen: Screen, positions: Any, triangles: Any, t: int, area: int, view: View, out: Setup) -> None:
+    """Write a triangle that needs no clipping to its own slot."""
     zero, one = np.float32(0), np.float32(1)
-    a = snap(clip[0, 0], clip[0, 1], clip[0, 2], clip[0, 3], zero, zero, view)
-    b = snap(clip[1, 0], clip[1, 1], clip[1, 2], clip[1, 3], one, zero, view)
-    c = snap(clip[2, 0], clip[2, 1], clip[2, 2], clip[2, 3], zero, one, view)
-    if view.guard_band and not _in_guard_band(a, b, c):
-        return CLIPPED, 0
-    outcome, area, sites = cull(a, b, c, view)
-    if outcome == 0:
-        _store(a, b, c, area, view, out, t, t, triangles)
-    return outcome, sites
+    a = _corner(screen, positions, triangles[t, 0], zero, zero)
+    b = _corner(screen, positions, triangles[t, 1], one, zero)
+    c = _corner(screen, positions, triangles[t, 2], zero, one)
+    _store(a, b, c, area, view, out, t, t, triangles)
 
 
 @kernel
-def clip_and_store(scratch: Scratch, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
+def clip_and_store(scratch: Scratch, positions: Any, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
     """Clip one triangle and write what survives (a single survivor to the own slot); returns survivors and fan size."""
     clip, polygon = scratch.clip, scratch.polygon
+    for k in range(3):
+        for c in range(4):
+            clip[k, c] = positions[triangles[t, k], c]
     n = clip_triangle(clip, polygon, scratch.spare, scratch.plane, scratch.steps)
     kept = _fan(clip, polygon, n, view, out, slot, t, triangles)
     if kept == 1 and slot < 0:
