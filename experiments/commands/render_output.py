@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tilestamp.experiments.commands.terminal import print_table, writing
 from tilestamp.models.error_model import was_measured
-from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.run_views import draw
 
 FORMATS = {"count": ",.0f", "bytes": ",.0f", "ratio": ".4f", "distribution": ",.1f"}  # by kind of a counter
 COST = {"blocks": ",.0f", "warps": ",.0f", "instructions": ",.0f", "simd_efficiency": ".3f"}  # before counters
@@ -44,18 +44,8 @@ def map_path(output: Path, name: str) -> Path:
 
 def write_map(run: Run, name: str, path: Path) -> None:
     """Draw a counter's heat map."""
-    from tilestamp.reports.heatmap import heat_map
-
-    if name not in run.frame.maps:
-        raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
-    title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
-    counts = run.frame.maps[name]
-    by_pixel = counts.shape == (run.height, run.width)
-    unit = f"{name} a {'pixel' if by_pixel else 'tile'}"
-    tile, from_below = (1, False) if by_pixel else (run.frame.tile, run.frame.tiles_from_below)
-    size = run.width, run.height
     with writing(path):
-        heat_map(counts, path, title=title, unit=unit, size=size, tile=tile, from_below=from_below)
+        draw(run, "map", path, name)
 
 
 def as_json(run: Run) -> dict[str, Any]:
