@@ -74,7 +74,7 @@ class Shape(NamedTuple):
     in_step: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Launch:
     """One kernel launch in machine events.
 

@@ -21,7 +21,7 @@ from tilestamp.models.traffic import Traffic
 OWN = ("latency", "issue", "shared", "l1", "queue")  # what can hold a unit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spans:
     """The units of one launch in time; arrays (units,), cycles from the launch's beginning.
 

@@ -1,6 +1,5 @@
 """Map of the best of some choices over a plane: a colour a choice, the paler the closer the second best."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,12 +11,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from tilestamp.reports.style import Into
+
 COLUMNS = 3  # panels side by side, at most
 CLEAR = 0.3  # margin from which a colour is full
 PALEST = 0.25
 
 
-def choice_map(table: "pd.DataFrame", path: Path, *, x: str, y: str, panel: str, title: str, legend: str) -> None:
+def choice_map(table: "pd.DataFrame", into: "Into", *, x: str, y: str, panel: str, title: str, legend: str) -> "Axes":
     """Draw which choice is the best at each place, its margin in the cell, and lines where the choice changes.
 
     Parameters
@@ -25,10 +26,15 @@ def choice_map(table: "pd.DataFrame", path: Path, *, x: str, y: str, panel: str,
     table : DataFrame
         A row a place: ``x``, ``y`` (numbers or names, in order of appearance), ``panel`` (a name), ``best`` and
         ``margin`` (share by which the second best is worse, NaN where there is none).
-    path : Path
-        PNG to write.
+    into : Path or None
+        Where it goes (``tilestamp.reports.style``).
     legend : str
         What the choices are.
+
+    Returns
+    -------
+    Axes
+        The first panel's.
     """
     names = list(dict.fromkeys(table[panel]))
     across, up = (list(dict.fromkeys(table[axis])) for axis in (x, y))
@@ -36,7 +42,7 @@ def choice_map(table: "pd.DataFrame", path: Path, *, x: str, y: str, panel: str,
     rows = -(-len(names) // COLUMNS)
     columns = -(-len(names) // rows)
     size = ((0.62 * len(across) + 1.6) * columns + 1.4, (0.34 * len(up) + 1.2) * rows + 0.6)
-    with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
+    with figure(into, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
             part = table[table[panel] == name]
             _panel(axes, *(_field(part, x, y, across, up, choices)))
@@ -49,6 +55,8 @@ def choice_map(table: "pd.DataFrame", path: Path, *, x: str, y: str, panel: str,
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
         _legend(grid[0, -1], choices, legend)
+    first: Axes = grid[0, 0]
+    return first
 
 
 def _field(

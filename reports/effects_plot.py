@@ -1,32 +1,34 @@
 """Effects: a bar for each of some axes with its interval, the largest on top."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tilestamp.reports.style import PALETTE, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from tilestamp.reports.style import Into
 
 
 def effects_plot(
-    table: "pd.DataFrame", path: Path, *, value: str, x_label: str, title: str, inner: str = "", start: float = 0.0
-) -> None:
+    table: "pd.DataFrame", into: "Into", *, value: str, x_label: str, title: str, inner: str = "", start: float = 0.0
+) -> "Axes":
     """Draw the bars.
 
     Parameters
     ----------
     table : DataFrame
         A row a bar, the largest first: ``axis``, ``value``, ``low`` and ``high``, the ends of its interval.
-    path : Path
-        PNG to write.
+    into : Path, Axes or None
+        Where it goes (``tilestamp.reports.style``).
     inner : str
         A column to draw as a narrow bar inside: a part of the value.
     start : float
         Where bars begin: what says that there is no effect.
     """
     places = range(len(table))
-    with figure(path, title, figsize=(8.0, 0.32 * len(table) + 1.5)) as axes:
+    with figure(into, title, figsize=(8.0, 0.32 * len(table) + 1.5)) as axes:
         axes.barh(places, table[value] - start, left=start, color=PALETTE[0], height=0.62, label=value)
         if inner:
             axes.barh(places, table[inner] - start, left=start, color=PALETTE[1], height=0.24, label=inner)
@@ -37,3 +39,5 @@ def effects_plot(
         axes.set_xlim(left=start)
         axes.grid(visible=False, axis="y")
         axes.legend(fontsize=8, loc="lower right")
+    drawn: Axes = axes
+    return drawn

@@ -1,6 +1,5 @@
 """Cost against error on logarithmic axes: a colour a group, the front as steps, published points hollow."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,13 +10,15 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from tilestamp.reports.style import Into
+
 MARKERS = "os^vP*Xd"
 MOST_NAMES = 18
 NAME_WIDTH, NAME_HEIGHT = 0.25, 0.035  # of the axes
 
 
 def frontier(
-    path: Path,
+    into: "Into",
     points: "pd.DataFrame",
     xlabel: str,
     ylabel: str,
@@ -25,13 +26,13 @@ def frontier(
     *,
     label: bool = True,
     guide: float | None = None,
-) -> None:
+) -> "Axes":
     """Draw cost against error, lower left is better.
 
     Parameters
     ----------
-    path : Path
-        PNG to write.
+    into : Path, Axes or None
+        Where it goes (``tilestamp.reports.style``).
     points : DataFrame
         A row a point: ``name`` (its label), ``group`` (colour and legend), ``cost``, ``error``, ``published`` (bool:
         drawn hollow) and, if there is one to draw, ``front`` (bool). An error of zero is drawn at the foot of the
@@ -48,7 +49,7 @@ def frontier(
     foot = 10.0 ** np.floor(np.log10(positive.min()) - 0.5) if len(positive) else 1e-3
     none = shown["error"] <= 0
     shown["height"] = shown["error"].where(~none, foot)
-    with figure(path, title, figsize=(8.6, 5.6)) as axes:
+    with figure(into, title, figsize=(8.6, 5.6)) as axes:
         for index, (group, rows) in enumerate(shown.groupby("group", sort=False)):
             color, marker = PALETTE[index % len(PALETTE)], MARKERS[index % len(MARKERS)]
             for published, part in rows.groupby("published"):
@@ -75,6 +76,8 @@ def frontier(
         if label:
             _label(axes, shown)
         axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    drawn: Axes = axes
+    return drawn
 
 
 def _ticks(axes: "Axes") -> None:

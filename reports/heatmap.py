@@ -1,32 +1,36 @@
 """Heat maps of a counter, a cell a tile or a pixel."""
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.reports.style import HEAT, figure
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tilestamp.reports.style import Into
+
 
 def heat_map(
     counts: NDArray[Any],
-    path: Path,
+    into: "Into",
     *,
     title: str,
     unit: str,
     size: tuple[int, int],
     tile: int = 1,
     from_below: bool = False,
-) -> None:
+) -> "Axes":
     """Draw ``counts`` over the screen with a colour bar.
 
     Parameters
     ----------
     counts : ndarray, (rows, columns)
         Row 0 is the top row; NaN stays white.
-    path : Path
-        PNG to write.
+    into : Path, Axes or None
+        Where it goes (``tilestamp.reports.style``).
     unit : str
         What a cell counts.
     size : tuple of int
@@ -36,7 +40,7 @@ def heat_map(
     from_below : bool
         Whether the cells begin at the bottom of the screen.
     """
-    with figure(path, title, figsize=(8, 6.4 * size[1] / size[0] + 1.0)) as axes:
+    with figure(into, title, figsize=(8, 6.4 * size[1] / size[0] + 1.0)) as axes:
         shown = np.ma.masked_invalid(np.asarray(counts, np.float64))
         top = float(np.quantile(shown.compressed(), 0.999)) if shown.count() else 1.0
         image = axes.imshow(
@@ -51,6 +55,8 @@ def heat_map(
         axes.grid(visible=False)
         axes.set(xlabel="x [pixels]", ylabel="y [pixels]")
         axes.figure.colorbar(image, ax=axes, label=unit, shrink=0.9, extend="max")
+    drawn: Axes = axes
+    return drawn
 
 
 def extent(cells: tuple[int, ...], height: int, tile: int, *, from_below: bool) -> tuple[int, int, int, int]:

@@ -10,7 +10,10 @@ from tilestamp.reports.style import HEAT, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+
+    from tilestamp.reports.style import Into
 
 COLUMNS = 3  # panels side by side, at most
 
@@ -46,17 +49,33 @@ def value_maps(
     size = (5.2 * columns, 3.2 * rows + 0.6)
     with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, (name, table) in zip(grid.flat, maps.items(), strict=False):
-            x, y = _edges(table.columns, log_x), _edges(table.index, log_y)
-            image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
-            axes.grid(visible=False)
+            _panel(axes, table, unit, log_x, log_y, top, "neither" if top >= 1 else "max")
             axes.set(title=name, xlabel=x_label, ylabel=y_label)
-            axes.figure.colorbar(image, ax=axes, label=unit, extend="neither" if top >= 1 else "max")
-            axes.set_xscale("log" if log_x else "linear")
-            axes.set_yscale("log" if log_y else "linear")
-            _name(axes.xaxis, table.columns, rotation=60)
-            _name(axes.yaxis, table.index)
         for axes in grid.flat[len(maps) :]:
             axes.set_visible(False)
+
+
+def value_map(
+    table: "pd.DataFrame", into: "Into", *, title: str, unit: str, x_label: str, y_label: str, top: float
+) -> "Axes":
+    """Draw one such table, of which neither axis is logarithmic; see ``value_maps``."""
+    with figure(into, title) as axes:
+        _panel(axes, table, unit, log_x=False, log_y=False, top=top, extend="neither")
+        axes.set(xlabel=x_label, ylabel=y_label)
+    drawn: Axes = axes
+    return drawn
+
+
+def _panel(axes: "Axes", table: "pd.DataFrame", unit: str, log_x: bool, log_y: bool, top: float, extend: str) -> None:
+    """Draw one table."""
+    x, y = _edges(table.columns, log_x), _edges(table.index, log_y)
+    image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
+    axes.grid(visible=False)
+    axes.figure.colorbar(image, ax=axes, label=unit, extend=extend)
+    axes.set_xscale("log" if log_x else "linear")
+    axes.set_yscale("log" if log_y else "linear")
+    _name(axes.xaxis, table.columns, rotation=60)
+    _name(axes.yaxis, table.index)
 
 
 def _edges(labels: "pd.Index", log: bool) -> NDArray[np.float64]:

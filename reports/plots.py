@@ -7,6 +7,9 @@ from tilestamp.reports.style import PALETTE, PUBLISHED, figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from tilestamp.reports.style import Into
 
 HATCHES = {"partly fitted": "//", "fitted": "//////"}  # of bars, by status
 MOST_INSIDE = 4  # series whose legend stands inside the axes; that of more would hide lines
@@ -14,7 +17,7 @@ MOST_INSIDE = 4  # series whose legend stands inside the axes; that of more woul
 
 def lines(
     table: "pd.DataFrame",
-    path: Path,
+    into: "Into",
     *,
     x: str,
     y: str,
@@ -25,19 +28,19 @@ def lines(
     published: str | None = None,
     log_x: bool = False,
     log_y: bool = False,
-) -> None:
+) -> "Axes":
     """Draw one line for each value of ``by``; column ``published`` as hollow diamonds of the line's colour.
 
     Parameters
     ----------
     table : DataFrame
         A row a point.
-    path : Path
-        PNG to write.
+    into : Path, Axes or None
+        Where it goes (``tilestamp.reports.style``).
     x, y, by, published : str
         Columns.
     """
-    with figure(path, title) as axes:
+    with figure(into, title) as axes:
         for color, (name, group) in zip(PALETTE * 4, table.groupby(by, sort=False), strict=False):
             rows = group.sort_values(x)
             axes.plot(rows[x], rows[y], marker="o", markersize=4, color=color, label=str(name))
@@ -54,6 +57,8 @@ def lines(
             axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         else:
             axes.legend()
+    drawn: Axes = axes
+    return drawn
 
 
 def paired_bars(

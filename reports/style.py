@@ -3,7 +3,13 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    Into = Path | Axes | None
+    """Where a plot goes: a PNG file, axes that are there, or a new figure, which stays open and a notebook shows."""
 
 PALETTE = ("#1f5aa6", "#d95f02", "#1b9e77", "#7b5ea7", "#c2185b", "#8d6e2f", "#4f6d7a", "#000000")
 PUBLISHED = {"marker": "D", "markerfacecolor": "none", "markeredgecolor": "black", "markersize": 7, "linestyle": "none"}
@@ -27,32 +33,41 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def figure(path: Path, title: str, **layout: Any) -> Iterator[Any]:
-    """Open a figure with axes in the house style and save it to ``path`` at the end.
+def figure(into: "Into", title: str, figsize: tuple[float, float] | None = None, **layout: Any) -> Iterator[Any]:
+    """Draw in the house style: give axes, and at the end save them where ``into`` is a file.
 
     Parameters
     ----------
-    path : Path
-        A PNG file.
+    into : Path, Axes or None
+        A PNG file; axes to draw on; or a new figure, which stays open.
     title : str
         What the plot shows, in a sentence.
+    figsize : tuple of float, optional
+        Width and height in inches.
     **layout
-        For ``matplotlib.pyplot.subplots``.
+        For ``matplotlib.figure.Figure.subplots``.
     """
     import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
     from cycler import cycler
+    from matplotlib.figure import Figure
 
     settings: Any = SETTINGS | {"axes.prop_cycle": cycler(color=PALETTE)}
     with mpl.rc_context(settings):
-        fig, axes = plt.subplots(**layout)
-        try:
-            yield axes
-            fig.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
-            fig.tight_layout()
-            path.parent.mkdir(parents=True, exist_ok=True)
-            fig.savefig(path)
-        finally:
-            plt.close(fig)
+        if into is not None and not isinstance(into, Path):
+            yield into
+            into.set_title(title)
+            return
+        fig = Figure(figsize=figsize) if into else _opened(figsize)
+        yield fig.subplots(**layout)
+        fig.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        fig.tight_layout()
+        if into:
+            into.parent.mkdir(parents=True, exist_ok=True)
+            fig.savefig(into)
+
+
+def _opened(figsize: tuple[float, float] | None) -> Any:
+    """A figure that pyplot knows, so that a notebook or a window shows it."""
+    from matplotlib import pyplot as plt
+
+    return plt.figure(figsize=figsize)

@@ -1,12 +1,17 @@
 """Timeline: rows over time, in a colour for what is done and as strong as it is."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.reports.style import PALETTE, figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tilestamp.reports.style import Into
 
 FAINTEST = 0.25  # of what is taken at all
 WAITING = (0.88, 0.88, 0.88)
@@ -16,14 +21,14 @@ def timeline_plot(
     taken: NDArray[np.float64],
     kind: NDArray[np.int64],
     waits: NDArray[np.bool_],
-    path: Path,
+    into: "Into",
     *,
     names: Sequence[str],
     title: str,
     x_label: str,
     y_label: str,
     end: float,
-) -> None:
+) -> "Axes":
     """Draw rows over time.
 
     Parameters
@@ -34,8 +39,8 @@ def timeline_plot(
         Index into ``names``: the colour.
     waits : ndarray, (columns,), bool
         Where the rows wait for something else: grey, where nothing is taken.
-    path : Path
-        PNG to write.
+    into : Path, Axes or None
+        Where it goes (``tilestamp.reports.style``).
     end : float
         Time of the last column's end.
     """
@@ -46,7 +51,7 @@ def timeline_plot(
     strength = np.where(taken > 1e-9, FAINTEST + (1 - FAINTEST) * np.clip(taken, 0.0, 1.0), 0.0)[..., None]
     ground = np.where(waits[:, None], WAITING, 1.0)
     image = strength * colors[kind] + (1 - strength) * ground
-    with figure(path, title, figsize=(11.0, 2.6 + 0.02 * len(taken))) as axes:
+    with figure(into, title, figsize=(11.0, 2.6 + 0.02 * len(taken))) as axes:
         axes.imshow(image, aspect="auto", extent=(0.0, end, len(taken) - 0.5, -0.5), interpolation="nearest")
         axes.grid(visible=False)
         axes.yaxis.get_major_locator().set_params(integer=True)
@@ -54,3 +59,5 @@ def timeline_plot(
         handles = [Patch(color=color, label=name) for color, name in zip(colors, names, strict=True)]
         handles.append(Patch(color=WAITING, label="memory, atomics"))
         axes.legend(handles=handles, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    drawn: Axes = axes
+    return drawn

@@ -19,7 +19,7 @@ def remarks(sentences: Mapping[str, str], facts: Mapping[str, Any]) -> tuple[str
     return tuple(sentence.format(facts[fact]) for fact, sentence in sentences.items() if facts.get(fact))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """The picture of one pipeline and the work of its stages, in launch order.
 

@@ -29,7 +29,7 @@ VARIABLES = ("TILESTAMP_", "NUMBA_", "OMP_", "OPENBLAS_", "MKL_")  # first lette
 DIGITS = 16  # hexadecimal, of a digest
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Origin:
     """What a run came from, beside what it names itself.
 

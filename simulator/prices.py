@@ -23,7 +23,7 @@ TOGETHER = 64  # machines at least that a thread prices at a time
 Machines = Iterable[Machine | str | Path] | Mapping[str, ArrayLike]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prices:
     """Times of one run on many machines.
 

@@ -27,7 +27,7 @@ FRAME = "frame"  # the row of all stages together
 Times = dict[str, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sensitivity:
     """What moves the time of a run.
 

@@ -16,14 +16,14 @@ from tilestamp.models.traffic import Traffic, traffic
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 if TYPE_CHECKING:
-    from tilestamp.simulator.run import Run
+    from tilestamp.simulator.priced_frame import PricedFrame
 
 BINS = 500  # of the counters of a launch that takes the whole frame
 LEAST = 12  # of those of a short one
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LaunchTimeline:
     """One launch; times in microseconds from the beginning of the frame.
 
@@ -70,7 +70,7 @@ class LaunchTimeline:
     counters: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
 
-def timeline(run: "Run") -> Iterator[LaunchTimeline]:
+def timeline(run: "PricedFrame") -> Iterator[LaunchTimeline]:
     """Give the launches of a run in time, one after another.
 
     Raises
@@ -88,7 +88,7 @@ def timeline(run: "Run") -> Iterator[LaunchTimeline]:
 
 
 def _launch(
-    run: "Run",
+    run: "PricedFrame",
     work: Work | FixedFunctionWork,
     launch: Launch | PipeLaunch,
     timing: Timing,

@@ -12,7 +12,7 @@ from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.simulator.sampling.strata import Sample
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Work:
     """What one kernel of a stage did.
 

@@ -10,6 +10,7 @@ import pytest
 from tilestamp import TilestampError, altered, load_machine, simulate
 from tilestamp.experiments.commands import trace
 from tilestamp.reports.chrome_trace import Process, write_trace
+from tilestamp.simulator.run_views import taken
 from tilestamp.simulator.timeline import timeline
 
 NANOSECOND = 1e-3  # of a microsecond
@@ -158,10 +159,10 @@ def test_a_trace_that_cannot_be_written_leaves_nothing(tmp_path, run):
 def test_what_an_sm_has_taken_is_the_time_of_its_units(run):
     edges = np.linspace(0.0, run.milliseconds * 1e3, 98)
     for launch in timeline(run):
-        taken = trace.taken(launch, edges)
+        busy = taken(launch, edges)
         spent = np.bincount(launch.sm, launch.stop - launch.start, launch.sms)
-        assert (taken * launch.slots).sum(axis=1) * edges[1] == pytest.approx(spent)
-        assert taken.max(initial=0.0) <= 1 + 1e-9
+        assert (busy * launch.slots).sum(axis=1) * edges[1] == pytest.approx(spent)
+        assert busy.max(initial=0.0) <= 1 + 1e-9
 
 
 def test_a_queue_that_is_served_in_time_has_no_backlog():

@@ -10,8 +10,8 @@ from tilestamp.experiments.commands.render_table import print_stages
 from tilestamp.experiments.commands.tables import print_lines
 from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.error_model import was_measured
-from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.run_views import draw
 
 
 def write_png(image: NDArray[np.uint8], path: Path) -> None:
@@ -34,18 +34,8 @@ def map_path(output: Path, name: str) -> Path:
 
 def write_map(run: Run, name: str, path: Path) -> None:
     """Draw a counter's heat map."""
-    from tilestamp.reports.heatmap import heat_map
-
-    if name not in run.frame.maps:
-        raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; it has {', '.join(run.frame.maps)}")
-    title = f"{name}: {run.scene}, {run.pipeline}, {run.width}x{run.height}"
-    counts = run.frame.maps[name]
-    by_pixel = counts.shape == (run.height, run.width)
-    unit = f"{name} a {'pixel' if by_pixel else 'tile'}"
-    tile, from_below = (1, False) if by_pixel else (run.frame.tile, run.frame.tiles_from_below)
-    size = run.width, run.height
     with writing(path):
-        heat_map(counts, path, title=title, unit=unit, size=size, tile=tile, from_below=from_below)
+        draw(run, "map", path, name)
 
 
 def as_json(run: Run) -> dict[str, Any]:

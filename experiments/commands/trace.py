@@ -10,11 +10,11 @@ from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.spans import OWN
 from tilestamp.reports.chrome_trace import Process, write_trace
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.run_views import draw
 from tilestamp.simulator.timeline import LaunchTimeline, timeline
 
 SLICES = 200_000  # that a viewer still opens at once
 UNITS = ("start", "stop", "sm", "slot", "holds", "items")  # what a timeline has of each unit
-COLUMNS = 1400  # of the picture
 
 
 def write_schedule(run: Run, path: Path) -> str:
@@ -92,41 +92,5 @@ def _parts(launch: LaunchTimeline) -> list[tuple[str, float, float]]:
 
 def draw_timeline(run: Run, path: Path) -> None:
     """Draw which SMs are taken, over time, in a colour for each stage."""
-    from tilestamp.reports.timeline_plot import timeline_plot
-
-    launches = list(timeline(run))
-    edges = np.linspace(0.0, run.milliseconds * 1e3, COLUMNS + 1)
-    stages = list(dict.fromkeys(launch.stage for launch in launches))
-    middles = (edges[1:] + edges[:-1]) / 2
-    which = np.searchsorted([launch.end for launch in launches], middles).clip(max=len(launches) - 1)
-    shown = sum((taken(launch, edges) for launch in launches), np.zeros((run.machine.sm.count, COLUMNS)))
-    waits = middles > np.array([launch.units_end for launch in launches])[which]
-    title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {run.milliseconds:.4g} ms"
     with writing(path, "--timeline"):
-        timeline_plot(
-            shown,
-            np.array([stages.index(launch.stage) for launch in launches])[which],
-            waits,
-            path,
-            names=stages,
-            title=title,
-            x_label="milliseconds",
-            y_label="SM",
-            end=run.milliseconds,
-        )
-
-
-def taken(launch: LaunchTimeline, edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of each SM's places that a launch takes between edges, (SMs, columns)."""
-    step = edges[1] - edges[0]
-    total = np.zeros((launch.sms, len(edges)))
-    for times, sign in ((launch.start, 1.0), (launch.stop, -1.0)):
-        at = times / step
-        begun = np.zeros((2, launch.sms, len(edges)))  # units that began until an edge, and the sum of when
-        column = np.ceil(at).astype(np.int64).clip(max=len(edges) - 1)
-        np.add.at(begun[0], (launch.sm, column), 1.0)
-        np.add.at(begun[1], (launch.sm, column), at)
-        count, when = begun.cumsum(axis=2)
-        total += sign * (np.arange(len(edges)) * count - when)
-    share: NDArray[np.float64] = np.diff(total, axis=1) / launch.slots
-    return share
+        draw(run, "timeline", path)

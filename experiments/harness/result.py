@@ -88,7 +88,7 @@ class Figure:
     """A plot to draw: a file name and the function that draws it there."""
 
     name: str
-    draw: "Callable[[Path], None]"
+    draw: "Callable[[Path], object]"
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
 """Answers: a table, sentences and a picture for each question to a study."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.frontier.pareto import pareto_front
@@ -13,7 +12,9 @@ from tilestamp.experiments.questions.search import search
 from tilestamp.experiments.questions.space import numbers, recording
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.study import Study
+from tilestamp.experiments.studies.study_views import table_card
 from tilestamp.models.errors import TilestampError
+from tilestamp.reports.card import card
 from tilestamp.reports.choice_map import choice_map
 from tilestamp.reports.effects_plot import effects_plot
 from tilestamp.reports.frontier_plot import frontier
@@ -21,19 +22,30 @@ from tilestamp.reports.plots import lines
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from tilestamp.reports.style import Into
 
 Say = Callable[[str], None]
 MOST_PANELS = 12
 DOUBT = 0.01  # margin below which two are as good as each other
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Answer:
     """What a question found."""
 
     table: "pd.DataFrame"
     sentences: list[str]
-    draw: Callable[[Path], None]
+    draw: "Callable[[Into], Axes]" = field(repr=False)
+    """Draws into a file, or a new figure (None)."""
+
+    def _repr_html_(self) -> str:
+        return card("; ".join(self.sentences), [table_card(self.table)])
+
+    def plot(self) -> "Axes":
+        """Draw it; of several panels the first is given, and ``.figure.axes`` has all."""
+        return self.draw(None)
 
 
 def silent(_: str) -> None:
@@ -95,14 +107,14 @@ def _front(shown: "pd.DataFrame", cells: int) -> str:
     return f"Nothing else of {cells} cells beats these {len(shown)} in both"
 
 
-def _draw_front(table: "pd.DataFrame", axes: list[str], one: str, other: str, path: Path) -> None:
+def _draw_front(table: "pd.DataFrame", axes: list[str], one: str, other: str, into: "Into") -> "Axes":
     import pandas as pd
 
     group = next((name for name in axes if not are_numbers(list(table[name]))), None)
     names = [", ".join(f"{name} {_short(row[name])}" for name in axes) for row in table.to_dict("records")]
     points = {"name": names, "group": table[group] if group else "cells", "cost": table[one], "error": table[other]}
     frame = pd.DataFrame({**points, "published": False, "front": table["front"]})
-    frontier(path, frame, one, other, f"{other} against {one}: lower left is better")
+    return frontier(into, frame, one, other, f"{other} against {one}: lower left is better")
 
 
 def _short(value: object) -> str:
@@ -143,20 +155,19 @@ def searched(study: Study, wanted: Sequence[str], cells: int = 64, seed: int = 0
     return Answer(shown, [sentence], partial(_draw_search, table, list(wanted)))
 
 
-def _draw_search(table: "pd.DataFrame", wanted: list[str], path: Path) -> None:
+def _draw_search(table: "pd.DataFrame", wanted: list[str], into: "Into") -> "Axes":
     """Draw the front of the first two numbers, or how the least of one fell."""
     import pandas as pd
 
     if len(wanted) > 1:
-        _draw_front(table.assign(front=table["best"]), [], wanted[0], wanted[1], path)
-        return
+        return _draw_front(table.assign(front=table["best"]), [], wanted[0], wanted[1], into)
     number = wanted[0]
     steps = pd.DataFrame(
         {"cell": range(1, len(table) + 1), "each": table[number], "least so far": table[number].cummin()}
     )
     tidy = steps.melt("cell", var_name="what", value_name=number).dropna()
-    lines(
-        tidy, path, x="cell", y=number, by="what", title=f"A search for little {number}", x_label="cell", y_label=number
+    return lines(
+        tidy, into, x="cell", y=number, by="what", title=f"A search for little {number}", x_label="cell", y_label=number
     )
 
 

@@ -4,17 +4,49 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tilestamp.experiments.studies import cells, forecast, runner
+from tilestamp.experiments.studies import cells, forecast, runner, study_views
 from tilestamp.experiments.studies.axes import Choice
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.parameters import Resolver
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 
 class Study(Design):
     """A design that can be run: see ``Design`` for its parameters."""
+
+    def __repr__(self) -> str:
+        """Say in a line how many cells of which axes it has."""
+        return f"<Study: {study_views.heading(self)}>"
+
+    def _repr_html_(self) -> str:
+        """What is stored of its table, for a notebook."""
+        return study_views.card(self, self.table)
+
+    def plot(
+        self, kind: study_views.Kind = "lines", number: str = "milliseconds", *, x: str = "", axes: "Axes | None" = None
+    ) -> "Axes":
+        """Draw a number of the stored cells over the axes.
+
+        Parameters
+        ----------
+        kind : {"lines", "map"}
+            Over one axis, a line for each place on the others; or over two axes, as colours.
+        number : str
+            A column of the table.
+        x : str
+            The axis to draw over; the first one of numbers if not given.
+        axes : matplotlib Axes, optional
+            To draw on; those of a new figure if not given.
+
+        Raises
+        ------
+        TilestampError
+            No such plot, axis or number; no cell is stored; a map of more or less than two axes.
+        """
+        return study_views.draw(self, self.table(), kind, number, x, axes)
 
     def forecast(self, jobs: int | None = None, resolver: Resolver | None = None) -> forecast.Forecast:
         """Say what a run would do: cells, executions, seconds; see ``run``."""

@@ -20,7 +20,7 @@ PILOT = 200  # units that the first sample draws in proportion to size, and ...
 PILOT_EACH = 10  # ... at least from each stratum
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Strata:
     """Units by stratum; stratum 0 is the certainty stratum.
 
@@ -54,7 +54,7 @@ class Strata:
         return np.array([part.sum() for part in np.split(self.ordered[:, 1], self.first[1:-1])])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """Units that ran, and what they did.
 

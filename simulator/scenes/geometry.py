@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Patches:
     """Rational bicubic Bezier patches.
 
@@ -32,7 +32,7 @@ class Patches:
             raise TilestampError(f"patches: patch {int(light.argmax())} has a weight that is not positive")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Indexed triangles.
 
