@@ -86,6 +86,7 @@ def _app(arguments: list[str]) -> "App":
     from tilestamp.experiments.commands.compare import compare
     from tilestamp.experiments.commands.measure_machine import measure_machine
     from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
+    from tilestamp.experiments.commands.page import page
     from tilestamp.experiments.commands.render import PIPELINE, render
     from tilestamp.experiments.commands.reproduce import reproduce
     from tilestamp.experiments.commands.study import study
@@ -100,7 +101,7 @@ def _app(arguments: list[str]) -> "App":
     )
     draws = arguments[:1] == ["render"]
     app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)) if draws else render)
-    for command in (compare, study, ask, reproduce, validate, measure_machine):
+    for command in (compare, study, ask, reproduce, page, validate, measure_machine):
         app.command(command)
     app.command(catalogue, name="list")
     return app

@@ -7,19 +7,22 @@ of a time half, for the price of that work is still a prediction. Then a cell is
 
 - ``predicted`` up to a share of ``PREDICTED``: numbers that were fitted on other frames leave it so;
 - ``fitted`` from ``FITTED_FROM`` on, and wherever a number was fitted to this very cell;
-- ``partly fitted`` between.
+- ``partly fitted`` between;
+- ``stand-in``, whatever it follows, where its frame, or that of a cell that it is made of, shows the stand-in for a
+  model that is not here (the first word of the frame): it says nothing of the model, and nothing of the machine.
 
 A word (an order, a winner) is as fitted as the most fitted of the cells that it is made of, and a number that is
 another cell's again as that cell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from tilestamp.experiments.harness.registry import Experiment, Progress
 from tilestamp.experiments.harness.result import Cell, Result, Status
 from tilestamp.models.fitted import STEP, moving, names_cell, on_frame
 from tilestamp.models.used import CHOSEN, FITTED, Used, collect
+from tilestamp.simulator.scenes.library import STAND_INS
 
 PREDICTED, FITTED_FROM = 0.1, 0.9
 WORK_OF_A_TIME = 0.5  # part of a time that a chosen input settles
@@ -53,7 +56,8 @@ def judged(result: Result, used: Used, experiment: Experiment) -> Result:
         _judged(cell, result.name, targets, price, work)
         for cell, price, work in zip(result.cells, by_price, by_input, strict=True)
     ]
-    return replace(result, cells=[_repeated(cell, cells) for cell in cells])
+    cells = [_repeated(cell, cells) for cell in cells]
+    return replace(result, cells=_stand_ins_marked(cells, used.get(STAND_INS, {}).keys()))
 
 
 def _parts(result: Result, numbers: Mapping[str, set[str]], experiment: Experiment) -> list[Parts]:
@@ -78,7 +82,7 @@ def _followed(cell: Cell, other: Cell) -> float:
 
 
 def _judged(cell: Cell, result: str, targets: list[str], by_price: Parts, by_input: Parts) -> Cell:
-    settled = WORK_OF_A_TIME if cell.is_time else 1.0
+    settled = WORK_OF_A_TIME if cell.kind == "time" else 1.0
     parts = by_price | {name: settled * part for name, part in by_input.items()}
     price = min(1.0, sum(by_price.values()))
     work = settled * max(by_input.values(), default=0.0)
@@ -95,6 +99,15 @@ def _status(cell: Cell, share: float) -> Status:
     if share >= FITTED_FROM:
         return "fitted"
     return "partly fitted" if share > PREDICTED else "predicted"
+
+
+def _stand_ins_marked(cells: list[Cell], absent: Collection[str]) -> list[Cell]:
+    """Mark the cells whose frame shows a stand-in, and those that are made of such cells."""
+    drawn = {(cell.row, cell.column) for cell in cells if cell.frame.split(" ")[0] in absent}
+    return [
+        replace(cell, status="stand-in") if drawn.intersection({(cell.row, cell.column), *cell.of}) else cell
+        for cell in cells
+    ]
 
 
 def _repeated(cell: Cell, cells: list[Cell]) -> Cell:

@@ -146,7 +146,7 @@ def _draw(cells: Sequence[Cell], path: "Path") -> None:
     import pandas as pd
 
     measured = pd.DataFrame([{"area": area, "stage": stage, "ns": ns} for (area, stage), ns in published_ns().items()])
-    times = [c for c in cells if c.is_time]
+    times = [c for c in cells if c.kind == "time"]
     rows = [{"area": float(c.row.split()[0]), "stage": c.column, "ns": c.ours, "status": c.status} for c in times]
     labels = ("area of a triangle [pixels]", "time for a triangle [ns]")
     title = "Time of each stage, synthetic sweep, GTX 480"

@@ -71,7 +71,7 @@ def run(progress: Callable[[str], None]) -> Result:
                         Cell(label, f"{kernel} time", "us", published=row["us"], ours=_at(row, factor), aim=AIM_TIME)
                     )
     return Result(
-        name="silicon-leave-one-out",
+        name="silicon-leave_one_out",
         title="H200, one scene left out of the fit",
         source=SOURCE,
         cells=cells,
