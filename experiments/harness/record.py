@@ -91,13 +91,11 @@ def _cell(record: dict[str, Any]) -> Cell:
     return Cell(**values | {"ours": math.nan if values["ours"] is None else values["ours"]})
 
 
-def strict(value: Any) -> Any:
+def strict(value: object) -> object:
     """Plain data as JSON takes it: numbers of Python's, and null for what is no number."""
     if isinstance(value, dict):
         return {key: strict(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [strict(item) for item in value]
-    if isinstance(value, float) or hasattr(value, "item"):
-        number = value.item() if hasattr(value, "item") else value
-        return None if isinstance(number, float) and not math.isfinite(number) else number
-    return value
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
