@@ -42,11 +42,26 @@ def run(progress: Progress) -> Result:
             published=BOX_TEST_SAVING,
             ours=multisampled,
             status="reported",
+            frame=KILLEROO,
         ),
         Cell(
-            "8x8 stamp, every lane of every quad", "STE", "", published=THEORETICAL_STE, ours=ste_all, status="reported"
+            "8x8 stamp, every lane of every quad",
+            "STE",
+            "",
+            published=THEORETICAL_STE,
+            ours=ste_all,
+            status="reported",
+            frame=KILLEROO,
         ),
-        Cell("8x8 stamp, warps that evaluate edges", "STE", "", published=None, ours=ste, status="reported"),
+        Cell(
+            "8x8 stamp, warps that evaluate edges",
+            "STE",
+            "",
+            published=None,
+            ours=ste,
+            status="reported",
+            frame=KILLEROO,
+        ),
         Cell("bound and split", "patches a second", "1/s", published=PATCHES_PER_SECOND, ours=rate, frame=KILLEROO),
         Cell(
             "edges loaded, not computed",
@@ -55,6 +70,7 @@ def run(progress: Progress) -> Result:
             published=None,
             ours=loaded_ms,
             status="reported",
+            frame=KILLEROO,
         ),
         Cell(
             "edges computed by each thread",
@@ -63,6 +79,7 @@ def run(progress: Progress) -> Result:
             published=None,
             ours=computed_ms,
             status="reported",
+            frame=KILLEROO,
         ),
     ]
     return Result(

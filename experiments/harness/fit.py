@@ -26,6 +26,7 @@ from tilestamp.simulator.scenes.library import STAND_INS
 
 PREDICTED, FITTED_FROM = 0.1, 0.9
 WORK_OF_A_TIME = 0.5  # part of a time that a chosen input settles
+STATED = {"reported", "reproduced"}  # by an experiment itself
 NAMED = 0.005  # smaller parts are not named
 Parts = dict[str, float]
 """Of a change of a number, by its name, the part that a cell follows."""
@@ -63,8 +64,13 @@ def judged(result: Result, used: Used, experiment: Experiment) -> Result:
 def _parts(result: Result, numbers: Mapping[str, set[str]], experiment: Experiment) -> list[Parts]:
     """What each cell follows of each number that was fitted on its frame."""
     found: list[Parts] = [{} for _ in result.cells]
+    parts_of_others = {place for cell in result.cells for place in cell.of}
+    wanted = [c.status not in STATED or (c.row, c.column) in parts_of_others for c in result.cells]
     for name, targets in sorted(numbers.items()):
-        frames = [any(on_frame(target, cell.frame) for target in targets) for cell in result.cells]
+        frames = [
+            judged and any(on_frame(target, cell.frame) for target in targets)
+            for judged, cell in zip(wanted, result.cells, strict=True)
+        ]
         if any(frames):
             with moving(name):
                 again = experiment(lambda _: None).cells
@@ -94,7 +100,7 @@ def _judged(cell: Cell, result: str, targets: list[str], by_price: Parts, by_inp
 
 
 def _status(cell: Cell, share: float) -> Status:
-    if cell.status in {"reported", "reproduced"}:
+    if cell.status in STATED:
         return cell.status
     if share >= FITTED_FROM:
         return "fitted"

@@ -102,7 +102,7 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     rows = table.to_dict("records")
     under = [row for row in rows if row["model"] == "bigguy" and row["ste"] < PAPER_STE]
     for near in sorted(under, key=lambda row: -row["ste"])[:1]:
-        place = f"bigguy level {near['level']}, height {near['height']}"
+        place, frame = f"bigguy level {near['level']}, height {near['height']}", f"bigguy {near['height']}"
         cells.append(
             Cell(
                 place,
@@ -111,17 +111,18 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
                 published=None,
                 ours=near["ste"],
                 status="reported",
+                frame=frame,
             )
         )
-        cells.append(Cell(place, "gain", "x", published=WANTED["bigguy"], ours=near["gain"], aim=0.1))
+        cells.append(Cell(place, "gain", "x", published=WANTED["bigguy"], ours=near["gain"], aim=0.1, frame=frame))
     for row in rows:
         if row["model"] == "cube" and row["level"] == 7:
             place = f"cube 7 rounds, height {row['height']}"
             cells.append(Cell(place, "gain", "x", published=WANTED["cube"], ours=row["gain"], aim=0.1))
     for row in rows:
-        place = f"{row['model']} level {row['level']}, height {row['height']}"
+        place, frame = f"{row['model']} level {row['level']}, height {row['height']}", f"{row['model']} {row['height']}"
         cells += [
-            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported")
+            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported", frame=frame)
             for column, name, unit in REPORTED
         ]
     return cells
@@ -137,6 +138,7 @@ def _reading_cells(found: list[Reading]) -> list[Cell]:
             published=None,
             ours=min(getattr(reading, model), key=lambda gain: abs(gain - wanted)),
             status="reported",
+            frame=model,
         )
         for reading in found
         for model, wanted in WANTED.items()

@@ -82,6 +82,7 @@ def _cell(row: dict[str, Any]) -> Cell:
         ours=row["utilisation"],
         status="reproduced" if compared else "reported",
         aim=0.05 if compared else None,
+        frame=f"{row['scene']} {WIDTH}x{HEIGHT}",
     )
 
 
