@@ -12,6 +12,7 @@ from tilestamp.experiments.harness.scoreboard import Errors, Row, total
 from tilestamp.experiments.harness.texts import percent, score_text
 
 WIDE = 110  # columns in a file or a pipe
+ROOM = 1000  # columns that any table has room in
 HEAD = ("times", "mean", "worst", "aim"), ("counts", "mean", "worst", "aim")
 LEGEND = "Of predicted cells: number, mean and worst error in %, and how many of those with an aim are within it."
 
@@ -24,7 +25,7 @@ def print_scoreboard(rows: Sequence[Row], advice: Sequence[str]) -> None:
     if compared:
         console.print("\n[bold]Published or measured beside the model[/]", highlight=False)
         table = _lines(compared)
-        fits = console.measure(table).minimum <= console.width
+        fits = console.measure(table, options=console.options.update(width=ROOM)).maximum <= console.width
         console.print(table if fits else _stacked(compared))
         console.print(LEGEND, style="dim", highlight=False)
     others = [row for row in rows if not row.compares and row.state == "done"]
@@ -47,11 +48,11 @@ def _lines(rows: Sequence[Row]) -> Table:
     table = Table(header_style="bold", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", overflow="fold")
     for name in (*HEAD[0], *HEAD[1], "orders"):
-        table.add_column(name, justify="right", no_wrap=True)
-    others = {"fitted": "fit-\nted", "partly_fitted": "partly", "stand_ins": "stand-\nins"}
+        table.add_column(name, justify="right", no_wrap=True, vertical="bottom")
+    others = {"fitted": "fitted", "partly_fitted": "partly\nfitted", "stand_ins": "stand-\nins"}
     shown = [name for name in others if any(getattr(row, name) for row in rows)]
     for name in shown:
-        table.add_column(others[name], justify="right", no_wrap=True)
+        table.add_column(others[name], justify="right", no_wrap=True, vertical="bottom")
     for group, some in _named(rows):
         table.add_row(Text(group, style="bold"))
         for row in some:
@@ -68,6 +69,7 @@ def _stacked(rows: Sequence[Row]) -> Table:
     table.add_column("", overflow="fold")
     for name in ("", "", "mean", "worst", "aim"):
         table.add_column(name, justify="right", no_wrap=True)
+    table.columns[2].justify = "left"
     for group, some in _named(rows):
         table.add_row(Text(group, style="bold"))
         for row in some:

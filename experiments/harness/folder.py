@@ -55,8 +55,8 @@ def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
         files = " and ".join(f"{name}.bpt" for name in absent)
         number = sum(row.stand_ins for row in rows)
         said.append(
-            f"{number} cells are of stand-ins, and say nothing of the model: put {files} into a folder, name that "
-            f"folder in {SCENES_VARIABLE}, and reproduce: what they change is run again"
+            f"{number} {'cell' if number == 1 else 'cells'} of stand-ins say nothing of the model: put {files} into a "
+            f"folder, name that folder in {SCENES_VARIABLE}, and reproduce: what they change is run again"
         )
     lacking = [(r["experiment"], " ".join(r["warnings"])) for r in records if r["state"] == NOT_RUN]
     said += [f"{name} was not run: {why.removeprefix('not run: ')}" for name, why in lacking]
