@@ -16,6 +16,7 @@ from tilestamp.experiments.harness.result import Cell, Result
 if TYPE_CHECKING:
     from tilestamp.simulator.run import Run
 
+QUESTION = "Do box tests save what the text says, and is the sample test efficiency of an 8x8 stamp 2 %?"
 BOX_TEST_SAVING = 0.30  # of total time
 THEORETICAL_STE = 0.02  # quoted after Fatahalian et al. 2009, not measured
 STE_LIMIT = 0.017  # 16 px2 of box / (1.65 tiles x 9 quads x 64 tests)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "Which tile size is the fastest, near and far?"
 TILES = (4, 8, 16)
 ZOOMS = (1, 2, 3, 4)  # views zoom1 to zoom4 of the killeroo; the paper's levels are not printed
 PUBLISHED_ORDER = "8x8 < 4x4 < 16x16"  # in time

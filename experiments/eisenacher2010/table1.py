@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "Why does bucketing take longer with larger tiles?"
 SUBPATCHES = 270_000  # as printed
 COUNT_AIM, TIME_AIM = 0.02, 0.10
 CONFLICTS = {

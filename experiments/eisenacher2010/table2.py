@@ -12,6 +12,7 @@ from tilestamp.reports.plots import paired_bars
 if TYPE_CHECKING:
     from pathlib import Path
 
+QUESTION = "How long does a frame of each model take, on two screens, with two bounds, at one and four samples a pixel?"
 COUNT_AIM, TIME_AIM = 0.03, 0.15
 
 

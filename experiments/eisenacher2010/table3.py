@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "How long does each stage take, in software and in the hybrid?"
 STAGE_AIM, TOTAL_AIM = 0.20, 0.10
 SPLIT_MS, HYBRID_SPLIT_MS = 7.7 + 1.5, 7.7
 DICE_MS, COUNT_MS, SORT_MS, SETUP_MS = 6.0, 2.5, 0.3, 8.2

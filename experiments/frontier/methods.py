@@ -44,6 +44,7 @@ from tilestamp.simulator.simulation import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "Which method gives the best picture for its time?"
 SOURCE = (
     "Truth: our own exact rasterizer (simulator/reference): rational coverage, double precision, 64 samples a "
     "pixel for the converged picture (256 in the long run). Cost: the model's milliseconds"

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "What does a more accurate answer of the simulator cost?"
 SOURCE = (
     "Clock: this computer. Times of frames: Eisenacher & Loop 2010, Laine & Karras 2011, an H200. Other simulators: as "
     "published (detailed_simulators.csv names each source)"

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How much simulation time does sampling save, and at what error?"
 VARIABLE = "TILESTAMP_SAMPLED"
 ERRORS = (0.1, 0.03, 0.01)
 SEED = 1

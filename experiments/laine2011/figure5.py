@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "How long does each stage take as triangles grow?"
 WORST_AIM, MEDIAN_AIM = 0.25, 0.08
 COUNTER_AIM = 0.005  # the reference is rounded, and says that its last digits may move
 

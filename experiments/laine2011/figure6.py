@@ -19,6 +19,7 @@ from tilestamp.simulator.simulation import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "What does a further batch cost?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 BATCHES = (1, 2, 4, 8, 14)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How would the sweep of Figure 5 run on a GTX 680?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 OTHER = "gtx680"

@@ -19,6 +19,7 @@ from tilestamp.simulator.simulation import simulate
 if TYPE_CHECKING:
     from tilestamp.simulator.run import Run
 
+QUESTION = "What do the stages of a frame of Buddha take, and what does the profiler count?"
 FULL, REDUCED = "happy_vrip", "buddha_100k"  # the authors' mesh of 1,087,716 triangles, and a simplified one
 CAMERA = f"{Path(__file__).parent / 'cameras.json'}:buddha:0"
 # The simplified mesh is stored ten times as large as Stanford's (by the cameras' far plane), and elsewhere.

@@ -10,6 +10,7 @@ from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.ru2016.setting import MODELS_TILE, SOURCE, draw, frame_name, missing, published
 from tilestamp.simulator.run import Run
 
+QUESTION = "What do bilinear filtering and ambient occlusion cost?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 FILTERS = ("bilinear", "nearest")

@@ -23,6 +23,7 @@ from tilestamp.experiments.ru2016.setting import (
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.run import Run
 
+QUESTION = "Are tiles faster than one thread a triangle?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 METHODS: dict[str, tuple[str, dict[str, Any]]] = {

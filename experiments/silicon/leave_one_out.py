@@ -30,6 +30,7 @@ from tilestamp.models.machine import Machine, load_machine
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.work import Work
 
+QUESTION = "How well do fitted constants predict a scene that was left out of their fit?"
 SLOW = True  # counts every scene
 
 WIDTH = "TILESTAMP_LEAVE_OUT_WIDTH"

@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
 from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask
 
+QUESTION = "Which algorithm for testing samples is the fastest, at which area?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINES = ("gtx280", "gtx480", "h200")

@@ -20,6 +20,7 @@ from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 from tilestamp.simulator.stages.yao2011.bit_mask import BitMaskEvent, bit_mask
 
+QUESTION = "What does the bit mask gain on long and narrow polygons?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 ASPECTS = (1, 2, 4, 8, 16, 32)

@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, MaskKind, bit_mask
 
+QUESTION = "Does the bit mask raise the hit rate by as much as published?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 HEIGHTS = (96, 192, 384, 768)  # windows of 4:3

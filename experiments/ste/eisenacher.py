@@ -21,6 +21,7 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
+QUESTION = "What is the sample test efficiency of an 8x8 stamp on the paper's scenes?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 SCENES = ("teapot", "bigguy", "killeroo")

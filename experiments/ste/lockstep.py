@@ -20,6 +20,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_s
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 
+QUESTION = "What share of the lanes is at work across polygons, in lockstep and with repacking?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 SCENES = ("teapot", "killeroo", "bigguy")

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "Which number of the GTX 280, changed alone, would have made another tile size the best?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 TILES = (4, 8, 16)
 FACTORS = tuple(2.0**power for power in range(-6, 7) if power)

@@ -14,6 +14,7 @@ from tilestamp.reports.plots import stacked_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
 
+QUESTION = "What does a CUDA graph save over a stream?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINE = "ga104"

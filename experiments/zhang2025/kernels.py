@@ -14,6 +14,7 @@ from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
+QUESTION = "What do ten kernels take before and after optimization, and on which GPU?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 AIM = 0.5

@@ -18,6 +18,7 @@ from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.library import load_scene
 
+QUESTION = "What does each feature change in the picture?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 SCENE = "CesiumMilkTruck"

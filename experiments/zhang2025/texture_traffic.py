@@ -16,6 +16,7 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.stages.zhang2025.pixel_shader import Filter
 from tilestamp.simulator.work import Work
 
+QUESTION = "When do tiled texels save traffic?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINE = "ga104"
