@@ -46,11 +46,21 @@ def run(progress: Progress) -> Result:
         title="Figure 4: tile size and zoom, killeroo, 1600x1200, GTX 280",
         source=SOURCE,
         cells=_cells(table),
+        answer=_answer(table),
         figures=[Figure("zoom", lambda path: _draw(table, path))],
         notes=_notes(table),
         warnings=stand_in_warnings("killeroo"),
         tables={"zoom": table},
     )
+
+
+def _answer(table: "pd.DataFrame") -> str:
+    """The fastest tile at each level, and by how much the next one is slower."""
+    said = []
+    for zoom in ZOOMS:
+        best, second = table[table["zoom"] == zoom].nsmallest(2, "ms").to_dict("records")
+        said.append(f"{best['tile']} at zoom {zoom} (next: {second['ms'] / best['ms'] - 1:+.0%})")
+    return f"By the model {', '.join(said)}."
 
 
 def _cells(table: "pd.DataFrame") -> list[Cell]:

@@ -53,6 +53,7 @@ def run(progress: Progress) -> Result:
         title="The sweep on a GTX 680, by the mixes of the GTX 480",
         source=SOURCE,
         cells=cells,
+        answer=f"In {table['ratio'].min():.2f} to {table['ratio'].max():.2f} times a GTX 480's time, by stage.",
         figures=[Figure("ratio", lambda path: _draw(table, path))],
         notes=[
             (

@@ -66,6 +66,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Tile size",
         source=SOURCE,
         cells=cells + rows,
+        answer=f"In the order of their times: tiles of {order} pixels." if rows else "",
         figures=[CellFigure("time", _draw)] if rows else [],
         notes=notes,
         warnings=warnings,

@@ -61,6 +61,9 @@ def run(progress: Callable[[str], None]) -> Result:
         title="The mask on narrow polygons",
         source=source,
         cells=cells,
+        answer=f"At {ASPECTS[-1]}:1 between {table.gain[table.aspect == ASPECTS[-1]].min():.2f} and "
+        f"{table.gain[table.aspect == ASPECTS[-1]].max():.2f} times the efficiency, by area; at 1:1 between "
+        f"{table.gain[table.aspect == 1].min():.2f} and {table.gain[table.aspect == 1].max():.2f} times.",
         figures=[figure],
         notes=notes,
         warnings=[],

@@ -66,11 +66,21 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Bit mask filtering",
         source=SOURCE,
         cells=[*_cells(table), *_reading_cells(found)],
+        answer=_answer(table),
         figures=figures,
         notes=[*_notes(table), *said(found)],
         warnings=warnings,
         tables={"runs": table, "readings": as_table(found)},
     )
+
+
+def _answer(table: pd.DataFrame) -> str:
+    """The gains of each model beside what is published."""
+    gains = {key: table.gain[table.model == key] for key in WANTED}
+    said = [
+        f"{key} gains {gain.min():.2f} to {gain.max():.2f} (published: {WANTED[key]:g})" for key, gain in gains.items()
+    ]
+    return f"In sequence, by level and size: {'; '.join(said)}."
 
 
 def _measure(model: Model, level: int, height: int) -> dict[str, Any]:

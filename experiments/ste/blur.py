@@ -99,6 +99,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Blur: intervals against interleaving",
         source=source,
         cells=cells,
+        answer=notes[0],
         figures=figures,
         notes=notes,
         warnings=[],

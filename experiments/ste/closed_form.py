@@ -79,6 +79,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="STE by stamp and area",
         source=source,
         cells=cells,
+        answer=f"Yes in {all_} of {len(table)} cells, by intervals that hold for all cells together with 95 %.",
         figures=[figure],
         notes=notes,
         warnings=[],

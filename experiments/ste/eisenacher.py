@@ -70,11 +70,19 @@ def run(progress: Callable[[str], None]) -> Result:
         title="The 8x8 stamp on micropolygons",
         source=source,
         cells=cells,
+        answer=_answer(rows),
         figures=[figure],
         notes=notes,
         warnings=warnings,
         tables=tables,
     )
+
+
+def _answer(rows: list[dict[str, Any]]) -> str:
+    """The range over the scenes, and the area that would give what is quoted."""
+    efficiencies = [row["ste"] for row in rows]
+    there = f"{min(efficiencies):.2f} to {max(efficiencies):.2f} %; " if rows else ""
+    return f"{there}{QUOTED:g} %, as quoted, take squares of {_area_at(QUOTED / 100):.2f} pixels."
 
 
 def _swept(area: float) -> dict[str, float]:

@@ -43,6 +43,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Lanes at work across polygons",
         source="Luong 2010 (Stanford honours thesis), abstract: 65 % for LOCKSTEP, 85 % for REPACK",
         cells=[_cell(row) for row in rows],
+        answer=_notes(table)[0],
         figures=[Figure("utilisation", lambda path: _plot(table, path))],
         notes=_notes(table),
         warnings=[f"{name} is not on the scene path: its stand-in was drawn" for name in stand_ins],

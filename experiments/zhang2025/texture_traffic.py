@@ -51,6 +51,16 @@ def shader(scene: Scene, simt: Simt, layout: str, texture_filter: Filter) -> Wor
     return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
 
 
+def _answer(cells: list[Cell]) -> str:
+    """Settings in which tiles of 4x4 texels send fewer transactions than rows."""
+    ratios = [float(cell.ours) for cell in cells]
+    fewer = sum(ratio < 1 for ratio in ratios)
+    return (
+        f"In {fewer} of {len(ratios)} settings tiles of 4x4 texels send fewer transactions than rows, "
+        f"{min(ratios):.2f} to {max(ratios):.2f} times as many."
+    )
+
+
 def run(progress: Callable[[str], None]) -> Result:
     """Count texel transactions of both layouts."""
     simt = load_machine(MACHINE).simt
@@ -101,6 +111,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Texture traffic by layout",
         source=source,
         cells=cells,
+        answer=_answer(cells),
         figures=[figure],
         notes=notes,
         warnings=[],
