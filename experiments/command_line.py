@@ -26,7 +26,11 @@ COMMANDS = {  # where each is, and its line in the list of commands: its own fir
     "ask": ("ask:ask", "Ask a study: what is best where, what lies on a front, what matters, what is better still."),
     "reproduce": (
         "reproduce:reproduce",
-        "Print published tables beside what the model computes, cell by cell; write CSV, manifests, plots and a page.",
+        "Put published tables beside what the model computes: a scoreboard, the tables by name, files and a page.",
+    ),
+    "page": (
+        "page:page",
+        "Write the page and the scoreboard anew from the results that lie in a folder; nothing is run.",
     ),
     "validate": (
         "validate:validate",

@@ -76,14 +76,14 @@ def test_missing_input_is_said_in_its_place_and_the_others_go_on(experiments, tm
     experiments |= {"a/x": missing, "b/y": result("b/y")}
     assert run_command(["reproduce", "-j", "1", "-o", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert "! not run: put bunny.ply into a folder" in printed
+    assert "! a/x was not run: put bunny.ply into a folder" in printed
     assert "What a/x is." in (tmp_path / "index.html").read_text()
     assert (tmp_path / "b-y" / "manifest.json").is_file()
 
 
 def test_a_failure_is_named_at_the_end_with_exit_code_1_and_the_others_go_on(experiments, tmp_path, capsys):
     experiments |= {"a/x": lambda _: 1 / 0, "b/y": result("b/y")}
-    assert run_command(["reproduce", "-j", "1", "-o", str(tmp_path)]) == 1
+    assert run_command(["reproduce", "-v", "-j", "1", "-o", str(tmp_path)]) == 1
     told = capsys.readouterr()
     assert "[b/y]" in told.out
     assert told.err.strip().splitlines()[-1].startswith("tilestamp: a/x failed: ZeroDivisionError: division by zero (")

@@ -15,9 +15,11 @@ from tilestamp import simulate
 from tilestamp.experiments.commands import reproduce as command
 from tilestamp.experiments.eisenacher2010 import table1, table2
 from tilestamp.experiments.harness.fit import run_judged
+from tilestamp.experiments.harness.folder import rebuild
 from tilestamp.experiments.harness.result import Cell, Outcome, Result
+from tilestamp.experiments.harness.scoreboard import errors_of
 from tilestamp.experiments.harness.texts import PRINTED, cell_texts
-from tilestamp.experiments.harness.write import write_index, write_result
+from tilestamp.experiments.harness.write import Making, write_result
 
 KNOWN = [  # row, published, ours, status, aim; error as printed, and whether it is marked
     ("near", 10.0, 10.5, "predicted", 0.10, "+5.0 %", False),
@@ -31,7 +33,9 @@ KNOWN = [  # row, published, ours, status, aim; error as printed, and whether it
     ("same order", "a < b", "a < b", "predicted", None, "as published", False),
 ]
 CELLS = [Cell(row, "time", "ms", published=p, ours=o, status=status, aim=aim) for row, p, o, status, aim, *_ in KNOWN]
-MADE = Result(name="paper-known", title="Known errors", source="Nobody", cells=CELLS, notes=["a note"])
+MADE = Result(
+    experiment="paper/known", name="paper-known", title="Known errors", source="Nobody", cells=CELLS, notes=["a note"]
+)
 PREDICTED = "4 predicted times: mean error 60.5 %, worst 200.0 %"  # (5 + 27 + 10 + 200) / 4
 
 
@@ -47,7 +51,9 @@ def test_a_cell_says_its_error_and_whether_it_is_missed(known):
 
 
 def test_errors_of_predicted_cells_alone_are_averaged_and_none_is_left_out():
-    assert MADE.predicted_errors == pytest.approx([0.05, 0.27, 0.1, 2.0])
+    errors = errors_of(MADE, "predicted", "time")
+    assert (errors.number, errors.mean, errors.worst) == (4, pytest.approx(2.42 / 4), pytest.approx(2.0))
+    assert (errors.within, errors.aimed) == (2, 4)
 
 
 def test_the_printed_table_holds_every_cell(capsys):
@@ -60,10 +66,22 @@ def test_the_printed_table_holds_every_cell(capsys):
     assert "- a note" in lines
 
 
+def runs(monkeypatch, *outcomes):
+    """Let the command run experiments that come out so."""
+
+    def run(names, output, *_):
+        for outcome in outcomes:
+            assert outcome.name in names
+            if outcome.result is not None:
+                write_result(outcome.result, output, Making())
+            yield outcome
+
+    monkeypatch.setattr(command, "run_experiments", run)
+    monkeypatch.setattr(command, "select", lambda *_, **__: [outcome.name for outcome in outcomes])
+
+
 def test_the_command_prints_every_result_and_fails_where_one_failed(tmp_path, capsys, monkeypatch):
-    outcomes = [Outcome("paper/known", MADE), Outcome("paper/broken", failure="it broke")]
-    monkeypatch.setattr(command, "run_experiments", lambda *_: iter(outcomes))
-    monkeypatch.setattr(command, "select", lambda *_, **__: ["paper/known", "paper/broken"])
+    runs(monkeypatch, Outcome("paper/known", MADE), Outcome("paper/broken", failure="it broke"))
     assert command.reproduce("paper", output=tmp_path) == 1
     printed = capsys.readouterr()
     assert PREDICTED in printed.out
@@ -71,8 +89,7 @@ def test_the_command_prints_every_result_and_fails_where_one_failed(tmp_path, ca
 
 
 def test_the_json_holds_every_cell(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command, "run_experiments", lambda *_: iter([Outcome("paper/known", MADE)]))
-    monkeypatch.setattr(command, "select", lambda *_, **__: ["paper/known"])
+    runs(monkeypatch, Outcome("paper/known", MADE))
     assert command.reproduce("paper", output=tmp_path, json_=True) == 0
     (cells,) = json.loads(capsys.readouterr().out).values()
     assert [tuple(cell.values()) for cell in cells] == [cell_texts(cell) for cell in CELLS]
@@ -81,7 +98,9 @@ def test_the_json_holds_every_cell(tmp_path, capsys, monkeypatch):
 
 def test_the_csv_holds_every_cell_unrounded(tmp_path):
     third = Cell("third", "time", "ms", published=3.0, ours=1.0, status="predicted", aim=0.1)
-    folder = write_result(Result(name="p", title="", source="", cells=[*CELLS, third]), tmp_path, {})
+    folder = write_result(
+        Result(experiment="p/q", name="p-q", title="", source="", cells=[*CELLS, third]), tmp_path, Making()
+    )
     table = pd.read_csv(folder / "cells.csv", keep_default_na=False).set_index("row")
     for row, published, ours, status, aim, *_ in KNOWN:
         line = table.loc[row]
@@ -92,7 +111,8 @@ def test_the_csv_holds_every_cell_unrounded(tmp_path):
 
 
 def test_the_page_marks_what_is_missed_in_red_and_what_is_fitted_in_grey(tmp_path):
-    page = write_index([MADE], tmp_path).read_text()
+    write_result(MADE, tmp_path, Making())
+    page = rebuild(tmp_path)[2].read_text()
     marked = re.findall(r'<tr class="(.*?)">(.*?)</tr>', page, re.DOTALL)
     rows = [(marks.split(), re.findall(r"<td(.*?)>(.*?)</td>", cells)) for marks, cells in marked]
     assert [[text for _, text in cells] for _, cells in rows] == [

@@ -1,14 +1,17 @@
 """Results: cells, what is averaged, what is written."""
 
 import json
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
+from tilestamp.experiments.harness.folder import rebuild
 from tilestamp.experiments.harness.registry import describe, experiment_names, is_slow, process_of, select
 from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.scoreboard import errors_of
 from tilestamp.experiments.harness.texts import averages, cell_texts
-from tilestamp.experiments.harness.write import write_index, write_result
+from tilestamp.experiments.harness.write import Making, write_result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result
 from tilestamp.models.errors import TilestampError
 
@@ -21,11 +24,19 @@ def cell(published: float | str | None = 10.0, ours: float | str = 11.0, **more)
 def result(*cells: Cell) -> Result:
     return Result(
         name="paper-table",
+        experiment="paper/table",
         title="A table",
         source="A paper",
         cells=list(cells),
         tables={"more": pd.DataFrame({"a": [1]})},
     )
+
+
+def page_of(folder, *results: Result) -> str:
+    """The page over some results."""
+    for one in results:
+        write_result(one, folder, Making())
+    return rebuild(folder)[2].read_text()
 
 
 def test_the_error_is_relative():
@@ -40,13 +51,13 @@ def test_a_predicted_cell_outside_its_aim_is_missed():
 def test_a_fitted_cell_is_never_missed_and_never_averaged():
     fitted = cell(status="fitted")
     assert not fitted.missed
-    assert result(fitted, cell()).predicted_errors == [pytest.approx(0.1)]
+    assert [c.error for c in result(fitted, cell()).compared("predicted", "time")] == [pytest.approx(0.1)]
 
 
 @pytest.mark.parametrize("status", ["partly fitted", "reproduced"])
 def test_what_is_not_fitted_can_be_missed_but_is_not_averaged(status):
     assert cell(status=status).missed
-    assert result(cell(status=status)).predicted_errors == []
+    assert result(cell(status=status)).compared("predicted", "time") == []
 
 
 @pytest.mark.parametrize("ours", [float("nan"), float("inf"), "no time"])
@@ -70,8 +81,8 @@ def test_a_published_zero_is_missed_by_anything_else():
 
 def test_times_and_counts_are_averaged_apart():
     both = result(cell(), cell(ours=12.0, unit="", column="count"))
-    assert both.errors("predicted", times=True) == [pytest.approx(0.1)]
-    assert both.errors("predicted", times=False) == [pytest.approx(0.2)]
+    assert errors_of(both, "predicted", "time").mean == pytest.approx(0.1)
+    assert errors_of(both, "predicted", "count").mean == pytest.approx(0.2)
     assert averages(both) == [
         "1 predicted times: mean error 10.0 %, worst 10.0 %; 1 predicted counts: mean error 20.0 %, worst 20.0 %"
     ]
@@ -79,18 +90,18 @@ def test_times_and_counts_are_averaged_apart():
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns/triangle", "ns/triangle, gtx680"])
 def test_units_of_time(unit):
-    assert cell(unit=unit).is_time
+    assert cell(unit=unit).kind == "time"
 
 
 @pytest.mark.parametrize("unit", ["", "%", "1/s", "MB", "samples"])
 def test_units_of_something_else(unit):
-    assert not cell(unit=unit).is_time
+    assert cell(unit=unit).kind == "count"
 
 
 def test_a_cell_made_of_averaged_ones_is_not_averaged_again():
     total = cell(ours=15.0, column="total", of=(("row", "column"),))
-    assert result(cell(), total).predicted_errors == [pytest.approx(0.1)]
-    assert result(cell(status="fitted"), total).predicted_errors == [pytest.approx(0.5)]
+    assert errors_of(result(cell(), total), "predicted", "time").worst == pytest.approx(0.1)
+    assert errors_of(result(cell(status="fitted"), total), "predicted", "time").worst == pytest.approx(0.5)
 
 
 def test_partly_fitted_cells_have_an_average_of_their_own():
@@ -122,33 +133,33 @@ def test_texts_name_the_fitted_numbers_and_their_share():
 
 def test_the_page_and_the_table_of_cells_name_the_fitted_numbers(tmp_path):
     partly = result(cell(status="partly fitted", share=0.5, fitted_by=(("gpu: clock", 0.5),)))
-    assert "gpu: clock 50 %" in write_index([partly], tmp_path).read_text()
-    table = pd.read_csv(write_result(partly, tmp_path, {}) / "cells.csv")
+    assert "gpu: clock 50 %" in page_of(tmp_path, partly)
+    table = pd.read_csv(write_result(partly, tmp_path, Making()) / "cells.csv")
     assert table[["status", "share", "fitted by"]].iloc[0].tolist() == ["partly fitted", 0.5, "gpu: clock 50 %"]
 
 
 def test_the_page_has_the_averages(tmp_path):
-    assert "1 predicted times: mean error 10.0 %" in write_index([result(cell())], tmp_path).read_text()
+    assert "1 predicted times: mean error 10.0 %" in page_of(tmp_path, result(cell()))
 
 
 def test_a_missed_cell_is_red_on_the_page(tmp_path):
-    assert 'class="predicted missed"' in write_index([result(cell())], tmp_path).read_text()
+    assert 'class="predicted missed"' in page_of(tmp_path, result(cell()))
 
 
 def test_a_result_is_written_as_csv_and_manifest(tmp_path):
-    folder = write_result(result(cell()), tmp_path, {"names": []})
+    folder = write_result(result(cell()), tmp_path, Making())
     assert pd.read_csv(folder / "cells.csv")["ours"].tolist() == [11.0]
     assert (folder / "more.csv").exists()
     assert json.loads((folder / "manifest.json").read_text())["source_digest"]
 
 
 def test_a_result_replaces_the_one_before(tmp_path):
-    (write_result(result(cell()), tmp_path, {}) / "stale.csv").write_text("old")
-    assert not (write_result(result(cell()), tmp_path, {}) / "stale.csv").exists()
+    (write_result(result(cell()), tmp_path, Making()) / "stale.csv").write_text("old")
+    assert not (write_result(result(cell()), tmp_path, Making()) / "stale.csv").exists()
 
 
 def test_the_page_holds_every_cell(tmp_path):
-    text = write_index([result(cell(ours=12.5))], tmp_path).read_text()
+    text = page_of(tmp_path, result(cell(ours=12.5)))
     assert "12.5" in text
     assert "A table" in text
 
@@ -181,21 +192,17 @@ def test_every_experiment_says_what_it_is(name):
 
 def broken(name, method, holds, breaks):
     boundary = Boundary(method, "layers", "", holds, breaks, "it shows")
-    return atlas_result(f"stability/{name}", name, [boundary])
+    return replace(atlas_result(f"stability/{name}", name, [boundary]), experiment=f"stability/{name}")
 
 
 def test_all_boundaries_of_a_folder_are_one_table(tmp_path):
-    results = [broken("races", "per-primitive", 1, 2), result(cell(ours=1.0)), broken("layers", "tiled", 64, None)]
-    page = write_index(results, tmp_path).read_text()
+    page_of(tmp_path, broken("races", "per-primitive", 1, 2), result(cell()), broken("layers", "tiled", 64, None))
     table = pd.read_csv(tmp_path / "stability.csv")
     assert table.columns[0] == "experiment"
     assert table.experiment.tolist() == ["stability/races", "stability/layers"]
     assert table.holds.tolist() == [1, 64]
-    assert page.count('<table class="overview">') == 1
-    assert page.index("2 boundaries at one glance") < page.index('href="#stability-layers"')
-    assert "none tried" in page
 
 
 def test_results_without_boundaries_leave_no_such_table(tmp_path):
-    assert "overview" not in write_index([result(cell(ours=1.0))], tmp_path).read_text().split("</style>")[1]
-    assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
+    page_of(tmp_path, result(cell()))
+    assert sorted(path.suffix for path in tmp_path.iterdir() if path.is_file()) == [".csv", ".html", ".json"]

@@ -72,7 +72,7 @@ def test_sources_that_changed_since_are_said_and_their_cells_run_again(path, mon
 
 
 def test_an_edit_of_another_pipeline_makes_nothing_stale():
-    from tilestamp.experiments.studies.sources import ROOT, reached
+    from tilestamp.experiments.harness.sources import ROOT, reached
 
     found = reached("tilestamp.simulator.pipelines.cudaraster", "tilestamp.simulator.simulation")
     names = {path.relative_to(ROOT).as_posix() for path in found}

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MARKER = "<!-- Written by experiments/calibration/accuracy.py from results: do not edit. -->"
 PLOT = Path("reports/gallery/accuracy.png")
-LEFT_OUT = "silicon-leave-one-out/cells.csv"
+LEFT_OUT = "silicon-leave_one_out/cells.csv"
 TIME_AIM, KERNEL_AIM, COUNT_AIM = (0.06, 0.25), 0.12, 0.0  # mean and worst of all times; mean of a kernel; exact
 AIMS = {  # of other quantities, and whether in percent
     "blocks": (COUNT_AIM, True),

@@ -8,13 +8,16 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.outputs import write_json
+from tilestamp.experiments.commands.scoreboard import print_scoreboard
 from tilestamp.experiments.commands.tables import print_table
 from tilestamp.experiments.commands.terminal import progress
+from tilestamp.experiments.harness.folder import rebuild, stored
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
+from tilestamp.experiments.harness.record import result_of
 from tilestamp.experiments.harness.registry import experiment_names, select
 from tilestamp.experiments.harness.result import Outcome, Result
 from tilestamp.experiments.harness.texts import COLUMNS, PRINTED, averages, cell_texts, fitted_numbers
-from tilestamp.experiments.harness.write import write_index
+from tilestamp.experiments.harness.validity import outdated
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
@@ -24,11 +27,15 @@ FAILED = 1  # exit code where an experiment gave no result
 def reproduce(
     *names: str,
     all_: Annotated[bool, Parameter(name="--all", negative="")] = False,
+    again: Annotated[bool, Parameter(negative="")] = False,
+    verbose: Annotated[bool, Parameter(name=["--verbose", "-v"], negative="")] = False,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = RESULTS,
     json_: Annotated[bool, Parameter(name="--json", negative="")] = False,
     jobs: Annotated[int | None, Parameter(name=["--jobs", "-j"])] = None,
 ) -> int:
-    """Print published tables beside what the model computes, cell by cell; write CSV, manifests, plots and a page.
+    """Put published tables beside what the model computes: a scoreboard, the tables by name, files and a page.
+
+    A result that lies in the folder already, and that a run would give again, is not run again.
 
     Parameters
     ----------
@@ -36,6 +43,10 @@ def reproduce(
         Experiments (`tilestamp list experiments`), papers, or tables; those that are quick if none is given.
     all_
         Run the slow ones too.
+    again
+        Run all of them again, also where their results are still valid.
+    verbose
+        Print the whole table of every experiment; those that are named are printed anyway.
     output
         Folder for the results.
     json_
@@ -47,23 +58,35 @@ def reproduce(
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
     _make(output)
-    with progress(f"reproducing {len(chosen)} experiments") as say:
+    invalid = [name for name in chosen if again or outdated(output, name)]
+    printed = (lambda _: None) if json_ or not (names or verbose) else _print_result
+    kept = {record["experiment"]: result_of(record) for record in stored(output)}
+    for name in chosen:
+        if name not in invalid:
+            printed(kept[name])
+    with progress(f"reproducing {len(invalid)} experiments") as say:
         options = {"names": list(names), "command": shlex.join(sys.argv)}
-        outcomes: dict[str, Outcome] = {}
-        for outcome in run_experiments(chosen, output, options, say, jobs or default_jobs()):
-            outcomes[outcome.name] = outcome
-            say.count(len(outcomes), len(chosen))
-            if outcome.result is not None and not json_:
+        failed = []
+        for number, outcome in enumerate(run_experiments(invalid, output, options, say, jobs or default_jobs()), 1):
+            say.count(number, len(invalid))
+            failed += [outcome] if outcome.failure else []
+            if outcome.result is not None:
                 with say.paused():
-                    _print_result(outcome.result)
-        results = [result for name in chosen if (result := outcomes[name].result) is not None]
-        page = write_index(results, output)
+                    printed(outcome.result)
+        rows, advice, page = rebuild(output)
     if json_:
-        cells = {r.name: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
-        write_json(cells)
+        write_json(_as_json(output, chosen))
     else:
-        _print_end(output, page, set(experiment_names()) - set(chosen) if not names else set())
-    return _print_failures([outcomes[name] for name in chosen if outcomes[name].failure])
+        print_scoreboard(rows, advice)
+        left = set(experiment_names()) - {row.experiment for row in rows} if not names else set()
+        _print_end(output, page, len(chosen) - len(invalid), left)
+    return _print_failures(sorted(failed, key=lambda outcome: chosen.index(outcome.name)))
+
+
+def _as_json(output: Path, chosen: list[str]) -> dict[str, list[dict[str, str]]]:
+    """The cells of each result, as texts by column."""
+    results = [result_of(record) for record in stored(output) if record["experiment"] in chosen]
+    return {r.experiment: [dict(zip(COLUMNS, cell_texts(cell), strict=True)) for cell in r.cells] for r in results}
 
 
 def _make(output: Path) -> None:
@@ -80,11 +103,13 @@ def _print_failures(failed: list[Outcome]) -> int:
     return FAILED if failed else 0
 
 
-def _print_end(output: Path, page: Path, left: set[str]) -> None:
-    """Say where everything is, and what was left out for its time."""
-    sys.stdout.write(f"\nCSV, manifests and plots: {output}; the page: {page}\n")
+def _print_end(output: Path, page: Path, valid: int, left: set[str]) -> None:
+    """Say where everything is, what was not run again, and what was left out for its time."""
+    if valid:
+        sys.stdout.write(f"{valid} results were valid and not run again (--again runs them)\n")
     if left:
         sys.stdout.write(f"Not run, for their time (name them, or --all): {', '.join(sorted(left))}\n")
+    sys.stdout.write(f"CSV, manifests and plots: {output}; the page: {page}\n")
 
 
 def _print_result(result: Result) -> None:

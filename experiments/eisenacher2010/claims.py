@@ -16,6 +16,7 @@ from tilestamp.experiments.harness.result import Cell, Result
 if TYPE_CHECKING:
     from tilestamp.simulator.run import Run
 
+QUESTION = "Do box tests save what the text says, and is the sample test efficiency of an 8x8 stamp 2 %?"
 BOX_TEST_SAVING = 0.30  # of total time
 THEORETICAL_STE = 0.02  # quoted after Fatahalian et al. 2009, not measured
 STE_LIMIT = 0.017  # 16 px2 of box / (1.65 tiles x 9 quads x 64 tests)
@@ -42,11 +43,26 @@ def run(progress: Progress) -> Result:
             published=BOX_TEST_SAVING,
             ours=multisampled,
             status="reported",
+            frame=KILLEROO,
         ),
         Cell(
-            "8x8 stamp, every lane of every quad", "STE", "", published=THEORETICAL_STE, ours=ste_all, status="reported"
+            "8x8 stamp, every lane of every quad",
+            "STE",
+            "",
+            published=THEORETICAL_STE,
+            ours=ste_all,
+            status="reported",
+            frame=KILLEROO,
         ),
-        Cell("8x8 stamp, warps that evaluate edges", "STE", "", published=None, ours=ste, status="reported"),
+        Cell(
+            "8x8 stamp, warps that evaluate edges",
+            "STE",
+            "",
+            published=None,
+            ours=ste,
+            status="reported",
+            frame=KILLEROO,
+        ),
         Cell("bound and split", "patches a second", "1/s", published=PATCHES_PER_SECOND, ours=rate, frame=KILLEROO),
         Cell(
             "edges loaded, not computed",
@@ -55,6 +71,7 @@ def run(progress: Progress) -> Result:
             published=None,
             ours=loaded_ms,
             status="reported",
+            frame=KILLEROO,
         ),
         Cell(
             "edges computed by each thread",
@@ -63,6 +80,7 @@ def run(progress: Progress) -> Result:
             published=None,
             ours=computed_ms,
             status="reported",
+            frame=KILLEROO,
         ),
     ]
     return Result(
@@ -70,6 +88,8 @@ def run(progress: Progress) -> Result:
         title="Claims of the text, killeroo, 1600x1200, GTX 280",
         source=SOURCE,
         cells=cells,
+        answer=f"Box tests save {saving:.0%} of the time at one sample a pixel and {multisampled:.0%} at four; the "
+        f"stamp's efficiency is {ste_all:.2%}.",
         notes=_notes(ste_all, loaded_ms / computed_ms, tested),
         warnings=stand_in_warnings("killeroo"),
     )

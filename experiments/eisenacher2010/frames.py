@@ -1,7 +1,5 @@
 """The paper's frames: its models from its views on its machine, each executed once."""
 
-from functools import cache
-
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.price import Fidelity
 from tilestamp.models.remembered import remembered
@@ -27,7 +25,7 @@ FIXED_OVERHEAD = Fitted(  # the rest goes with the pixels: assumed
 )
 
 
-@cache
+@remembered
 def model(name: str) -> Scene:
     """The model, or a stand-in of about as many patches where the file is missing."""
     return scene_or_stand_in(name)

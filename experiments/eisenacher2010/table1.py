@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "Why does bucketing take longer with larger tiles?"
 SUBPATCHES = 270_000  # as printed
 COUNT_AIM, TIME_AIM = 0.02, 0.10
 CONFLICTS = {
@@ -48,6 +49,8 @@ def run(progress: Progress) -> Result:
         title="Table 1: bucketing by tile size, killeroo, 1600x1200, bounding box 4, GTX 280",
         source=SOURCE,
         cells=cells,
+        answer=f"The address calculation takes {table['ours'].iloc[0]:.2f} ms with tiles of 4 pixels and "
+        f"{table['ours'].iloc[-1]:.2f} ms with 32, where the fullest lock has {_growth(table)} as many requests.",
         figures=[Figure("address_calculation", lambda path: _draw(table, path))],
         notes=[
             (

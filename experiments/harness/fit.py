@@ -7,22 +7,26 @@ of a time half, for the price of that work is still a prediction. Then a cell is
 
 - ``predicted`` up to a share of ``PREDICTED``: numbers that were fitted on other frames leave it so;
 - ``fitted`` from ``FITTED_FROM`` on, and wherever a number was fitted to this very cell;
-- ``partly fitted`` between.
+- ``partly fitted`` between;
+- ``stand-in``, whatever it follows, where its frame, or that of a cell that it is made of, shows the stand-in for a
+  model that is not here (the first word of the frame): it says nothing of the model, and nothing of the machine.
 
 A word (an order, a winner) is as fitted as the most fitted of the cells that it is made of, and a number that is
 another cell's again as that cell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from tilestamp.experiments.harness.registry import Experiment, Progress
 from tilestamp.experiments.harness.result import Cell, Result, Status
 from tilestamp.models.fitted import STEP, moving, names_cell, on_frame
 from tilestamp.models.used import CHOSEN, FITTED, Used, collect
+from tilestamp.simulator.scenes.library import STAND_INS
 
 PREDICTED, FITTED_FROM = 0.1, 0.9
 WORK_OF_A_TIME = 0.5  # part of a time that a chosen input settles
+STATED = {"reported", "reproduced"}  # by an experiment itself
 NAMED = 0.005  # smaller parts are not named
 Parts = dict[str, float]
 """Of a change of a number, by its name, the part that a cell follows."""
@@ -53,14 +57,20 @@ def judged(result: Result, used: Used, experiment: Experiment) -> Result:
         _judged(cell, result.name, targets, price, work)
         for cell, price, work in zip(result.cells, by_price, by_input, strict=True)
     ]
-    return replace(result, cells=[_repeated(cell, cells) for cell in cells])
+    cells = [_repeated(cell, cells) for cell in cells]
+    return replace(result, cells=_stand_ins_marked(cells, used.get(STAND_INS, {}).keys()))
 
 
 def _parts(result: Result, numbers: Mapping[str, set[str]], experiment: Experiment) -> list[Parts]:
     """What each cell follows of each number that was fitted on its frame."""
     found: list[Parts] = [{} for _ in result.cells]
+    parts_of_others = {place for cell in result.cells for place in cell.of}
+    wanted = [c.status not in STATED or (c.row, c.column) in parts_of_others for c in result.cells]
     for name, targets in sorted(numbers.items()):
-        frames = [any(on_frame(target, cell.frame) for target in targets) for cell in result.cells]
+        frames = [
+            judged and any(on_frame(target, cell.frame) for target in targets)
+            for judged, cell in zip(wanted, result.cells, strict=True)
+        ]
         if any(frames):
             with moving(name):
                 again = experiment(lambda _: None).cells
@@ -78,7 +88,7 @@ def _followed(cell: Cell, other: Cell) -> float:
 
 
 def _judged(cell: Cell, result: str, targets: list[str], by_price: Parts, by_input: Parts) -> Cell:
-    settled = WORK_OF_A_TIME if cell.is_time else 1.0
+    settled = WORK_OF_A_TIME if cell.kind == "time" else 1.0
     parts = by_price | {name: settled * part for name, part in by_input.items()}
     price = min(1.0, sum(by_price.values()))
     work = settled * max(by_input.values(), default=0.0)
@@ -90,11 +100,20 @@ def _judged(cell: Cell, result: str, targets: list[str], by_price: Parts, by_inp
 
 
 def _status(cell: Cell, share: float) -> Status:
-    if cell.status in {"reported", "reproduced"}:
+    if cell.status in STATED:
         return cell.status
     if share >= FITTED_FROM:
         return "fitted"
     return "partly fitted" if share > PREDICTED else "predicted"
+
+
+def _stand_ins_marked(cells: list[Cell], absent: Collection[str]) -> list[Cell]:
+    """Mark the cells whose frame shows a stand-in, and those that are made of such cells."""
+    drawn = {(cell.row, cell.column) for cell in cells if cell.frame.split(" ")[0] in absent}
+    return [
+        replace(cell, status="stand-in") if drawn.intersection({(cell.row, cell.column), *cell.of}) else cell
+        for cell in cells
+    ]
 
 
 def _repeated(cell: Cell, cells: list[Cell]) -> Cell:

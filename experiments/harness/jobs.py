@@ -5,21 +5,26 @@ Compiling kernels holds one core, so that two processes make the first run on tw
 
 import os
 import shutil
+import time
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain, groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tilestamp.experiments.harness.fit import run_judged
 from tilestamp.experiments.harness.pool import end_processes, unordered
 from tilestamp.experiments.harness.registry import Progress, describe, load_experiment, process_of
 from tilestamp.experiments.harness.result import Figure, Outcome, Result
 from tilestamp.experiments.harness.telling import listening, tell, tell_compiling
-from tilestamp.experiments.harness.write import SCRATCH, write_result
+from tilestamp.experiments.harness.validity import made_from
+from tilestamp.experiments.harness.write import SCRATCH, Making, write_result
 from tilestamp.models.errors import MissingInputError, TilestampError
+
+if TYPE_CHECKING:
+    from tilestamp.models.used import Used
 
 
 def default_jobs() -> int:
@@ -85,12 +90,14 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
     """Run one experiment; what it lacks is said in its place."""
     try:
         say(name)
+        made, begin = made_from(name), time.perf_counter()
+        used: Used = {}
         try:
             result, used = run_judged(load_experiment(name), say)
         except MissingInputError as missing:
-            used = {}
             result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
-        write_result(result, output, options, used)
+        result = replace(result, experiment=name)
+        write_result(result, output, Making(options, used, made, time.perf_counter() - begin))
     except TilestampError as error:
         return Outcome(name, failure=str(error))
     except Exception as error:  # noqa: BLE001 - one experiment's fault ends no other

@@ -1,9 +1,10 @@
 """Experiments by name: a module in a paper's folder that has a function ``run`` is one (``eisenacher2010/table1``).
 
-A module that says ``SLOW = True`` runs only when it is named, or when all are asked for. A folder whose experiments
-share frames says ``ONE_PROCESS = True``.
+Its ``QUESTION`` is what it answers. A module that says ``SLOW = True`` runs only when it is named, or when all are
+asked for. A folder whose experiments share frames says ``ONE_PROCESS = True``.
 """
 
+import ast
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -28,11 +29,26 @@ def describe(name: str) -> str:
     return (import_module(_module(name)).__doc__ or "").strip().splitlines()[0]
 
 
+def question(name: str) -> str:
+    """What an experiment answers: ``QUESTION`` of its module, read without importing it."""
+    path = FOLDER / f"{name}.py"
+    body = ast.parse(path.read_text("utf-8")).body if path.is_file() else []
+    for line in body:
+        if isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) == "QUESTION":
+            return str(ast.literal_eval(line.value))
+    return ""
+
+
 def describe_folder(folder: str) -> str:
     """First line of the docstring of a folder of experiments; its name where there is none."""
     if not (FOLDER / folder / "__init__.py").is_file():
         return folder
     return (import_module(f"tilestamp.experiments.{folder}").__doc__ or folder).strip().splitlines()[0]
+
+
+def folder_name(name: str) -> str:
+    """Folder of an experiment's result."""
+    return name.replace("/", "-")
 
 
 def load_experiment(name: str) -> Experiment:

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-Status = Literal["predicted", "partly fitted", "fitted", "reproduced", "reported"]
+Status = Literal["predicted", "partly fitted", "fitted", "stand-in", "reproduced", "reported"]
+Kind = Literal["time", "count", "order"]
+NEVER_MISSED = {"fitted", "stand-in", "reported"}
 TIME_UNITS = ("s", "ms", "us", "ns")
 
 
@@ -25,9 +27,10 @@ class Cell:
     published : float, str or None
         As printed; an order or a name where that is what the source says; None where it says nothing.
     ours : float or str
-    status : {"predicted", "partly fitted", "fitted", "reproduced", "reported"}
+    status : {"predicted", "partly fitted", "fitted", "stand-in", "reproduced", "reported"}
         An experiment says that there is no aim (``reported``) or that what is published was computed like ours and not
-        measured (``reproduced``). How fitted any other cell is, is computed (``tilestamp.experiments.harness.fit``).
+        measured (``reproduced``). How fitted any other cell is, is computed (``tilestamp.experiments.harness.fit``);
+        so is whether its frame shows the ``stand-in`` for a model that is not here.
     aim : float or None
         Relative error aimed at.
     frame : str
@@ -63,8 +66,8 @@ class Cell:
 
     @property
     def missed(self) -> bool:
-        """Whether a cell that is not fitted lies outside its aim, or is something else than the source names."""
-        if self.status in {"fitted", "reported"} or self.published is None or _nothing(self.published):
+        """Whether a cell that says something of the model lies outside its aim, or is another word than published."""
+        if self.status in NEVER_MISSED or self.published is None or _nothing(self.published):
             return False
         if isinstance(self.published, str) or isinstance(self.ours, str) or not math.isfinite(self.ours):
             return self.published != self.ours
@@ -73,9 +76,11 @@ class Cell:
         return self.aim is not None and abs(self.ours / self.published - 1.0) > self.aim
 
     @property
-    def is_time(self) -> bool:
-        """Whether it is in units of time; what else there is, are counts and shares."""
-        return self.unit.partition("/")[0].partition(",")[0] in TIME_UNITS
+    def kind(self) -> Kind:
+        """A word (an order, a winner) is an ``order``; a time has a unit of time; all else are counts and shares."""
+        if isinstance(self.published, str) or (self.published is None and isinstance(self.ours, str)):
+            return "order"
+        return "time" if self.unit.partition("/")[0].partition(",")[0] in TIME_UNITS else "count"
 
 
 def _nothing(published: float | str) -> bool:
@@ -101,27 +106,44 @@ class CellFigure:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What one experiment found."""
+    """What one experiment found.
+
+    Parameters
+    ----------
+    name : str
+        As fitted numbers name it.
+    title, source : str
+        Of its table.
+    cells : list of Cell
+    answer : str
+        To the question of its module (``QUESTION``), in a sentence with numbers of this run; where it is left out, the
+        sentence says how far the cells are off (``tilestamp.experiments.harness.texts.answer``).
+    figures : sequence of Figure or CellFigure
+    notes : list of str
+    warnings : list of str
+        Stand-ins and what was left out: shown above the table.
+    tables : dict of DataFrame
+        Further tidy tables, written as CSV.
+    experiment : str
+        What ``tilestamp reproduce`` calls it; filled in by who runs it.
+    """
 
     name: str
     title: str
     source: str
     cells: list[Cell]
+    answer: str = ""
     figures: "Sequence[Figure | CellFigure]" = ()
     notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)  # stand-ins and the like: shown above the table
-    tables: dict[str, "pd.DataFrame"] = field(default_factory=dict)  # further tidy tables, written as CSV
+    warnings: list[str] = field(default_factory=list)
+    tables: dict[str, "pd.DataFrame"] = field(default_factory=dict)
+    experiment: str = ""
 
-    def errors(self, status: Status, *, times: bool) -> list[float]:
-        """Absolute relative errors of the cells of one kind, times or all else, but of cells made of others of them."""
+    def compared(self, status: Status, kind: Kind) -> list[Cell]:
+        """The cells of one status and kind that have an error, but for those made of others that have one."""
         chosen = {(c.row, c.column) for c in self.cells if c.status == status and c.error is not None}
         once = (c for c in self.cells if c.status == status and not chosen.intersection(c.of))
-        return [abs(c.error) for c in once if c.error is not None and c.is_time == times]
-
-    @property
-    def predicted_errors(self) -> list[float]:
-        """Absolute relative errors of the predicted cells: the only ones that speak of the model."""
-        return self.errors("predicted", times=True) + self.errors("predicted", times=False)
+        return [cell for cell in once if cell.error is not None and cell.kind == kind]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,9 @@
 """A result in words: a cell as the texts of its columns, what errors come to on average, which numbers were fitted."""
 
-from tilestamp.experiments.harness.result import Cell, Result
+import math
+
+from tilestamp.experiments.harness.result import Cell, Kind, Result, Status
+from tilestamp.experiments.harness.scoreboard import Errors, Row, errors_of
 
 COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim", "share", "fitted by")
 PRINTED = COLUMNS.index("share") + 1  # columns of the printed table: the numbers of all cells are named below it
@@ -31,16 +34,51 @@ def number(value: float | str | None) -> str:
 
 def averages(result: Result) -> list[str]:
     """Mean and worst error of the predicted cells and of the partly fitted ones, times apart from counts."""
-    sentences = []
-    for status in ("predicted", "partly fitted"):
-        parts = []
-        for what, times in (("times", True), ("counts", False)):
-            errors = result.errors(status, times=times)
-            if errors:
-                mean, worst = 100 * sum(errors) / len(errors), 100 * max(errors)
-                parts.append(f"{len(errors)} {status} {what}: mean error {mean:.1f} %, worst {worst:.1f} %")
-        sentences += ["; ".join(parts)] if parts else []
-    return sentences
+    statuses: tuple[Status, ...] = ("predicted", "partly fitted")
+    kinds: tuple[Kind, ...] = ("time", "count")
+    said = [[errors_text(errors_of(result, s, kind), f"{s} {kind}s") for kind in kinds] for s in statuses]
+    return ["; ".join(filter(None, parts)) for parts in said if any(parts)]
+
+
+def errors_text(errors: Errors, what: str) -> str:
+    """Number, mean and worst of some errors; nothing where there are none."""
+    if errors.mean is None or errors.worst is None:
+        return ""
+    return f"{errors.number:,} {what}: mean error {percent(errors.mean)} %, worst {percent(errors.worst)} %"
+
+
+def percent(share: float) -> str:
+    """A share in percent, with a digit after the point."""
+    return f"{100 * share:.1f}"
+
+
+def score_text(row: Row) -> str:
+    """A row of the scoreboard in words: times, counts, orders, and the cells that say nothing of the model."""
+    parts = [
+        f"{errors_text(errors, f'predicted {kind}')}, {errors.within:,} of {errors.aimed:,} within their aim"
+        for kind, errors in (("times", row.times), ("counts", row.counts))
+        if errors.number
+    ]
+    if row.orders.of:
+        parts.append(f"{row.orders.right} of {row.orders.of} orders and winners right")
+    numbers = {"fitted": row.fitted, "partly fitted": row.partly_fitted, "of stand-ins": row.stand_ins}
+    cells = [f"{number:,} {what}" for what, number in numbers.items() if number]
+    return "; ".join([*parts, *([f"cells {', '.join(cells)}"] if cells else [])])
+
+
+def disagreements(result: Result) -> list[str]:
+    """A sentence on each cell that is missed, largest errors first."""
+    missed = sorted(
+        (c for c in result.cells if c.missed), key=lambda c: -math.inf if c.error is None else -abs(c.error)
+    )
+    return [f"{cell.row}, {cell.column}: {_off(cell)}" for cell in missed]
+
+
+def _off(cell: Cell) -> str:
+    off = f"{number(cell.ours)} instead of {number(cell.published)} {cell.unit}".rstrip()
+    if cell.error is None or cell.aim is None:
+        return off
+    return f"{off}, {100 * cell.error:+.1f} % (aim {100 * cell.aim:.0f} %)"
 
 
 def fitted_numbers(result: Result) -> list[str]:

@@ -1,62 +1,93 @@
-"""Write a result: tidy CSV, a manifest, plots; one page over all results; and one table of all boundaries."""
+"""Write a result into a folder of its own: record, tidy CSV, plots, and a manifest of what made it."""
 
 import json
 import shutil
 import tempfile
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import tilestamp
-from tilestamp.experiments.harness.registry import describe_folder
-from tilestamp.experiments.harness.result import Cell, CellFigure, Figure, Result
-from tilestamp.experiments.harness.texts import COLUMNS, averages, cell_texts, fitted_by, number
+from tilestamp.experiments.harness.record import cell_records, record_of, strict
+from tilestamp.experiments.harness.registry import folder_name
+from tilestamp.experiments.harness.result import CellFigure, Figure, Result
+from tilestamp.experiments.harness.texts import COLUMNS, fitted_by
 from tilestamp.models.used import Used
-from tilestamp.reports.page import write_page
-from tilestamp.simulator.manifest import software, source_digest, used_manifest
+from tilestamp.simulator.manifest import software, used_manifest
+from tilestamp.simulator.scenes.library import STAND_INS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 SCRATCH = ".partial-"  # first letters of a folder that is being written
-BOUNDARIES = "boundaries"  # a table of results of the stability atlas
+RECORD, MANIFEST, CELLS = "result.json", "manifest.json", "cells.csv"
+COMPUTED = ("kind", "missed", "averaged", "frame")  # further columns of the table of cells
 
 
-def write_result(result: Result, folder: Path, options: dict[str, Any], used: Used | None = None) -> Path:
-    """Write one result into a folder of its own in ``folder``, all of it or nothing.
+@dataclass(frozen=True)
+class Making:
+    """How a result came about.
+
+    Parameters
+    ----------
+    options : dict
+        As the user gave them; ``command`` is the command line.
+    used : dict
+        What the experiment used (``tilestamp.models.used.collect``).
+    made_from : dict
+        What decides the result, as it was when the run began (``tilestamp.experiments.harness.validity``).
+    seconds : float
+        That it took.
+    """
+
+    options: dict[str, Any] = field(default_factory=dict)
+    used: Used = field(default_factory=dict)
+    made_from: dict[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+def write_result(result: Result, output: Path, making: Making) -> Path:
+    """Write one result into a folder of its own in ``output``, all of it or nothing.
 
     Parameters
     ----------
     result : Result
-    folder : Path
-    options : dict
-        As the user gave them; ``command`` is the command line.
-    used : dict, optional
-        What the experiment used (``tilestamp.models.used.collect``).
+    output : Path
+    making : Making
 
     Returns
     -------
     Path
         The result's folder.
     """
-    import pandas as pd
-
-    folder.mkdir(parents=True, exist_ok=True)
-    target = folder / result_folder(result)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=SCRATCH) as scratch:
+    output.mkdir(parents=True, exist_ok=True)
+    target = output / folder_name(result.experiment)
+    with tempfile.TemporaryDirectory(dir=output, prefix=SCRATCH) as scratch:
         made = Path(scratch) / target.name
         made.mkdir()
-        pd.DataFrame([_record(cell) for cell in result.cells], columns=list(COLUMNS)).to_csv(
-            made / "cells.csv", index=False
-        )
+        cell_table(result).to_csv(made / CELLS, index=False)
         for name, table in result.tables.items():
             table.to_csv(made / f"{name}.csv", index=False)
         for figure in result.figures:
             draw_figure(figure, result, made / f"{figure.name}.png")
-        (made / "manifest.json").write_text(json.dumps(_manifest(result, options, used or {}), indent=1) + "\n")
+        write_json(made / RECORD, record_of(result, made, sorted(making.used.get(STAND_INS, {})), making.seconds))
+        write_json(made / MANIFEST, _manifest(result, making))
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)
     return target
+
+
+def cell_table(result: Result) -> "pd.DataFrame":
+    """The cells as a tidy table."""
+    import pandas as pd
+
+    both = zip(cell_records(result), result.cells, strict=True)
+    records = [record | {"fitted by": fitted_by(cell)} for record, cell in both]
+    return pd.DataFrame(records, columns=[*COLUMNS, *COMPUTED])
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write plain data as strict JSON."""
+    path.write_text(json.dumps(strict(value), indent=1, allow_nan=False) + "\n", "utf-8")
 
 
 def draw_figure(figure: Figure | CellFigure, result: Result, path: Path) -> None:
@@ -67,107 +98,14 @@ def draw_figure(figure: Figure | CellFigure, result: Result, path: Path) -> None
         figure.draw(path)
 
 
-def _group(result: Result) -> str:
-    """Folder of the experiment: the part of its name before the first dash."""
-    return result_folder(result).split("-")[0]
-
-
-def result_folder(result: Result) -> str:
-    """Name of the folder of a result."""
-    return result.name.replace("/", "-")
-
-
-def _record(cell: Cell) -> dict[str, Any]:
-    """A cell as a tidy row."""
-    return {name: getattr(cell, name) for name in COLUMNS[:-1]} | {COLUMNS[-1]: fitted_by(cell)}
-
-
-def _manifest(result: Result, options: dict[str, Any], used: Used) -> dict[str, Any]:
+def _manifest(result: Result, making: Making) -> dict[str, Any]:
     """What made the result: versions and sources, command, all machines, mixes, scenes and runs that it used."""
     return {
-        "experiment": result.name,
+        "experiment": result.experiment,
         "source": result.source,
-        **software(options.get("command", "")),
-        "options": {name: value for name, value in options.items() if name != "command"},
+        **software(making.options.get("command", "")),
+        "made from": making.made_from,
+        "options": {name: value for name, value in making.options.items() if name != "command"},
         "warnings": result.warnings,
-        **used_manifest(used),
-    }
-
-
-def write_index(results: Sequence[Result], folder: Path) -> Path:
-    """Write the page over all results."""
-    path = folder / "index.html"
-    introduction = (
-        "Published cells beside what tilestamp computes. How fitted a cell is, is computed: each number that was "
-        "fitted on its frame is changed by 1 %, and share is the part of that change that the cell follows. Predicted: "
-        "at most 10 %; fitted: at least 90 %, or a number was chosen on this very cell: its error says nothing; "
-        "reproduced: published by a computation like ours, not measured. Only errors of predicted cells speak of the "
-        "model. Red: outside the aim."
-    )
-    footer = f"tilestamp {tilestamp.__version__}, sources {source_digest()}"
-    sections = [_section(result) for result in results]
-    for group, table in boundary_tables(results).items():
-        table.to_csv(folder / f"{group}.csv", index=False)
-        first = next(section for section in sections if section["group"] == group)
-        first["overview"] = _overview(group, table)
-    write_page(path, "tilestamp: papers beside the model", introduction, sections, footer)
-    return path
-
-
-def boundary_tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """All boundaries of each folder of experiments that has any, with the experiment that each was found by."""
-    import pandas as pd
-
-    groups: dict[str, list[pd.DataFrame]] = {}
-    for result in results:
-        if BOUNDARIES in result.tables:
-            table = result.tables[BOUNDARIES].copy()
-            table.insert(0, "experiment", result.name)
-            groups.setdefault(_group(result), []).append(table)
-    return {group: pd.concat(tables, ignore_index=True) for group, tables in groups.items()}
-
-
-def _overview(group: str, table: "pd.DataFrame") -> dict[str, Any]:
-    """All boundaries of a folder for the page: a row is the section that it is from, and texts."""
-    ends = {"holds", "breaks"}
-    columns = ["method", "parameter", "holds", "breaks", "unit", "wrong", "cure", "cost"]
-    records = table.to_dict(orient="records")
-    return {
-        "name": group,
-        "title": f"{describe_folder(group).split(':')[0]}: {len(table)} boundaries at one glance",
-        "file": f"{group}.csv",
-        "columns": columns,
-        "rows": [
-            {
-                "section": str(row["experiment"]).replace("/", "-"),
-                "cells": [_end(row[name]) if name in ends else row[name] for name in columns],
-            }
-            for row in records
-        ],
-    }
-
-
-def _end(value: float | None) -> str:
-    """A value that holds, or one that breaks."""
-    return "none tried" if value is None or value != value else number(value)  # noqa: PLR0124 - not-a-number
-
-
-def _section(result: Result) -> dict[str, Any]:
-    """One result for the page."""
-    return {
-        "name": result_folder(result),
-        "group": _group(result),
-        "about": describe_folder(_group(result)),
-        "title": result.title,
-        "source": result.source,
-        "warnings": result.warnings,
-        "averages": averages(result),
-        "notes": result.notes,
-        "columns": COLUMNS,
-        "error_column": COLUMNS.index("error"),
-        "rows": [
-            {"cells": cell_texts(cell), "marks": f"{cell.status.split()[-1]} {'missed' if cell.missed else ''}"}
-            for cell in result.cells
-        ],
-        "figures": [f"{result_folder(result)}/{figure.name}.png" for figure in result.figures],
+        **used_manifest(making.used),
     }

@@ -1,7 +1,7 @@
 """Figure 5: time of each stage over the area of the triangles, synthetic sweep, GTX 480 (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "How long does each stage take as triangles grow?"
 WORST_AIM, MEDIAN_AIM = 0.25, 0.08
 COUNTER_AIM = 0.005  # the reference is rounded, and says that its last digits may move
 
@@ -70,10 +71,20 @@ def run(progress: Progress) -> Result:
         title="Figure 5: synthetic sweep, 1024x768, neither depth test nor interpolation, GTX 480",
         source=SOURCE,
         cells=[*_summary(cells), *cells],
+        answer=_answer(rows),
         figures=[CellFigure("sweep", _draw)],
         notes=_notes(),
         tables={"sweep": table},
     )
+
+
+def _answer(rows: list[dict[str, Any]]) -> str:
+    """All stages together at the smallest and the largest area."""
+    said = []
+    for area in (rows[0]["area"], rows[-1]["area"]):
+        ours, theirs = (sum(row[name] for row in rows if row["area"] == area) for name in ("ns", "published"))
+        said.append(f"{ours:.2f} ns ({theirs:.2f} published) for a triangle of {area:g} pixels")
+    return f"The four stages take {' and '.join(said)}."
 
 
 def _bound(made: "Run", stage: str) -> str:
@@ -146,7 +157,7 @@ def _draw(cells: Sequence[Cell], path: "Path") -> None:
     import pandas as pd
 
     measured = pd.DataFrame([{"area": area, "stage": stage, "ns": ns} for (area, stage), ns in published_ns().items()])
-    times = [c for c in cells if c.is_time]
+    times = [c for c in cells if c.kind == "time"]
     rows = [{"area": float(c.row.split()[0]), "stage": c.column, "ns": c.ours, "status": c.status} for c in times]
     labels = ("area of a triangle [pixels]", "time for a triangle [ns]")
     title = "Time of each stage, synthetic sweep, GTX 480"

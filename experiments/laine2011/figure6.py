@@ -19,6 +19,7 @@ from tilestamp.simulator.simulation import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "What does a further batch cost?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 BATCHES = (1, 2, 4, 8, 14)
@@ -46,6 +47,7 @@ def run(progress: Progress) -> Result:
         title="Figure 6: cost of a further batch, 1024x768, GTX 480",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[Figure(name.lower(), partial(_draw, table[table["scene"] == name], name)) for name in _scenes()],
         notes=[
             "Slope: least squares over 1 to 14 batches, ours and theirs. Theirs is the mean over five cameras.",
@@ -57,6 +59,17 @@ def run(progress: Progress) -> Result:
         warnings=warnings,
         tables={"batches": table},
     )
+
+
+def _answer(cells: list[Cell]) -> str:
+    """All stages together, by scene."""
+    said = []
+    for name in dict.fromkeys(cell.row for cell in cells):
+        ours, theirs = (
+            sum(float(getattr(c, key) or 0) for c in cells if c.row == name) for key in ("ours", "published")
+        )
+        said.append(f"{ours:.0f} us for {name} ({theirs:.0f} published)")
+    return f"All stages together, {'; '.join(said)}." if said else ""
 
 
 def _scenes() -> dict[str, str]:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How would the sweep of Figure 5 run on a GTX 680?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 OTHER = "gtx680"
@@ -52,6 +53,7 @@ def run(progress: Progress) -> Result:
         title="The sweep on a GTX 680, by the mixes of the GTX 480",
         source=SOURCE,
         cells=cells,
+        answer=f"In {table['ratio'].min():.2f} to {table['ratio'].max():.2f} times a GTX 480's time, by stage.",
         figures=[Figure("ratio", lambda path: _draw(table, path))],
         notes=[
             (

@@ -14,6 +14,7 @@ from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTE
 if TYPE_CHECKING:
     from pathlib import Path
 
+QUESTION = "How much memory do set-up data and queues take?"
 SETUP_AIM, QUEUE_FACTOR = 0.05, 1.5
 WIDTH, HEIGHT = 1024, 768  # assumed: the slides do not say
 QUEUES = {"bin queues": "bin_queues_MB", "tile queues": "tile_queues_MB"}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from tilestamp.experiments.laine2011.generated import Statistics
 
+QUESTION = "How do CudaRaster, FreePipe and the hardware pipe compare on five scenes?"
 AIMS = {"hardware": 0.2, "cudaraster": 0.2, "freepipe": 0.3}
 SLOW = True  # with what it needs compiled, more than the first run should take
 

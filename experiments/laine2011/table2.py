@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+QUESTION = "What do more samples a pixel cost?"
 SLOW = True  # several frames of a million triangles
 
 SCENES = {"FairyForest": FAIRY, "Buddha": "buddha"}

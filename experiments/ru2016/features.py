@@ -10,6 +10,7 @@ from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.ru2016.setting import MODELS_TILE, SOURCE, draw, frame_name, missing, published
 from tilestamp.simulator.run import Run
 
+QUESTION = "What do bilinear filtering and ambient occlusion cost?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 FILTERS = ("bilinear", "nearest")
@@ -66,10 +67,21 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Filtering and ambient occlusion",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[],
         notes=notes,
         warnings=missing(absent),
     )
+
+
+def _answer(cells: list[Cell]) -> str:
+    """What each feature adds to a frame."""
+    said = []
+    for what, column in (("bilinear filtering", "bilinear - nearest"), ("ambient occlusion", "ssao: on - off")):
+        added = [float(cell.ours) for cell in cells if cell.column == column]
+        if added:
+            said.append(f"{what} adds {min(added):.2f} to {max(added):.2f} ms")
+    return f"By the model {' and '.join(said)}." if said else ""
 
 
 def _tiled(name: str, **options: Any) -> Run | None:

@@ -23,6 +23,7 @@ from tilestamp.experiments.ru2016.setting import (
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.run import Run
 
+QUESTION = "Are tiles faster than one thread a triangle?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 METHODS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -61,11 +62,19 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Tiles against primitives",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[CellFigure("times", _draw)],
         notes=notes,
         warnings=missing(absent),
         tables=tables,
     )
+
+
+def _answer(cells: list[Cell]) -> str:
+    """Models that tiles draw faster."""
+    winners = [cell for cell in cells if cell.column == "faster"]
+    tiles = [sum(getattr(cell, name) == "tiles" for cell in winners) for name in ("ours", "published")]
+    return f"By the model on {tiles[0]} of {len(winners)} models, as published on {tiles[1]}."
 
 
 def _winner(name: str, asked: "pd.Series[float]", frames: dict[str, Run]) -> Cell:

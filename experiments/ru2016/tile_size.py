@@ -22,6 +22,7 @@ from tilestamp.models.occupancy import residency
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.run import Run
 
+QUESTION = "Which tile size is the fastest, and what occupancy does each allow?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 REGISTERS = 63  # published
@@ -65,6 +66,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Tile size",
         source=SOURCE,
         cells=cells + rows,
+        answer=f"In the order of their times: tiles of {order} pixels." if rows else "",
         figures=[CellFigure("time", _draw)] if rows else [],
         notes=notes,
         warnings=warnings,

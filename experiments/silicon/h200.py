@@ -20,6 +20,7 @@ from tilestamp.reports.plots import paired_bars
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "How far off are times and counters on an H200, on scenes that some number was fitted to?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 NAME = "silicon-h200"

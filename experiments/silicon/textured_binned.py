@@ -29,6 +29,7 @@ from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.zhang2025.frame_clears import cleared_bytes
 from tilestamp.simulator.work import Work
 
+QUESTION = "How far off are Zhang's own kernels on an H200?"
 SLOW = True  # draws every measured frame
 
 NAME = "silicon-textured_binned"

@@ -14,6 +14,7 @@ from tilestamp.models.errors import MissingInputError
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
 
+QUESTION = "How far off are Ru's own kernels on an H200?"
 SLOW = True  # draws every measured frame
 
 SOURCE = f"One NVIDIA H200, 2026-11-29: the folder that {VARIABLE} names"

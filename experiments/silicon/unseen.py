@@ -22,6 +22,7 @@ from tilestamp.models.machine import load_machine
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "How far off are times and counters on an H200, on scenes that no number was fitted to?"
 SLOW = True  # counts 13 scenes at up to 2048 pixels
 
 WIDTH = "TILESTAMP_UNSEEN_WIDTH"

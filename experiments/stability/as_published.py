@@ -19,6 +19,7 @@ from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
 
+QUESTION = "What do the published sources of Ru and Zhang do that our pipelines do only on request?"
 SLOW = True  # the kernels of these pipelines are compiled for nothing else in the first run
 
 WIDTH = 64  # pixels

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Scale = Literal["log", "linear", "integer"]
+TOLD = 2  # boundaries that an answer names
 TOLERANCE = {"log": 0.01, "linear": 0.01, "integer": 1.0}  # ratio - 1; share of the range; units
 
 
@@ -145,11 +146,27 @@ def atlas_result(
         title=title,
         source=source,
         cells=cells,
+        answer=_answer(boundaries),
         figures=list(figures),
         notes=[*sentences, *_unbroken(boundaries), *notes],
         warnings=[],
         tables=tables,
     )
+
+
+def _answer(boundaries: Sequence[Boundary]) -> str:
+    """How many break, and where the first ones do."""
+    broken = [boundary for boundary in boundaries if boundary.breaks is not None]
+    if not broken:
+        return f"None of {len(boundaries)} breaks within what was tried."
+    said = [f"{boundary.method} from {_where(boundary)} ({boundary.wrong})" for boundary in broken[:TOLD]]
+    more = f"; and {len(broken) - TOLD} more" if len(broken) > TOLD else ""
+    return f"{len(broken)} of {len(boundaries)} break: {'; '.join(said)}{more}."
+
+
+def _where(boundary: Boundary) -> str:
+    """The first value that fails."""
+    return f"{boundary.parameter} {boundary.breaks:.4g} {boundary.unit}".rstrip()
 
 
 def _cells(boundary: Boundary) -> list[Cell]:
@@ -172,10 +189,9 @@ def _cells(boundary: Boundary) -> list[Cell]:
 
 def _sentence(boundary: Boundary) -> str:
     """What goes wrong and what the cure costs, for the page."""
-    where = f"{boundary.parameter} {boundary.breaks:.4g} {boundary.unit}".rstrip()
     cure = f" Cure: {boundary.cure}" if boundary.cure else ""
     cost = f" ({boundary.cost})" if boundary.cost else ""
-    return f"{boundary.method}: from {where}, {boundary.wrong}.{cure}{cost}{'.' if cure else ''}"
+    return f"{boundary.method}: from {_where(boundary)}, {boundary.wrong}.{cure}{cost}{'.' if cure else ''}"
 
 
 def _unbroken(boundaries: Sequence[Boundary]) -> list[str]:

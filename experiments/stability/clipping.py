@@ -26,6 +26,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygons import from_mesh
 from tilestamp.simulator.stages.ru2016.vertex_shading import primitive_assembly, vertex_shading
 from tilestamp.simulator.stages.zhang2025.clip_polygon import MOST_VERTICES, clip_polygon, outcode
 
+QUESTION = "What becomes of triangles that are larger than the screen, or reach the eye or the near plane?"
 SIZE = 64  # pixels
 WRONG = 0.01  # share of the screen from which we say that it breaks
 BRIGHTEST = 0.1  # share of wrong pixels in the map

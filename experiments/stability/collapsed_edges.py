@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How short may a patch's edge be before the normal at it is wrong?"
 SIZE = 128  # pixels a side
 LENGTHS = tuple(10.0 ** (-k / 2) for k in range(4, 21))  # of the edge, in radii of the dome
 ARC = 0.5522847  # control points of a quarter circle

@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, snap_e
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "From which bound on are there cracks between neighbours of different depth, and which cure closes them?"
 WIDTH, HEIGHT = 320, 240  # pixels
 CELLS = 6  # patches along a side of the sheet
 ROUGH = 0.6  # height of its control points, in patch sides

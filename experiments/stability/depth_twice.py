@@ -28,6 +28,7 @@ from tilestamp.simulator.stages.laine2011.exact import fma
 from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS, depth_24_bit, fragment_depth
 from tilestamp.simulator.stages.zhang2025.triangle_setup import evaluate
 
+QUESTION = "When does a depth that is computed twice leave holes?"
 SIZE = 64  # pixels
 PLANES = 16  # directions in which the plane rises
 RANGES = tuple(2.0**-k for k in range(31, 0, -2))  # depth across the screen, of a depth range of 1

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.work import Work
 
+QUESTION = "How far may displacement move a sub-patch before it leaves its tiles?"
 WIDTH, HEIGHT = 192, 144  # pixels
 WAVE = 6.0  # pixels from bump to bump
 BOUNDS = (2.0, 4.0, 8.0)  # pixels

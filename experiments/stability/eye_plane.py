@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "When does splitting a patch across the eye's plane not end?"
 WIDTH, HEIGHT = 96, 64  # pixels
 SIDE = 1.0  # of the floor, around the point below the eye: distances are in patch sides
 NEAR = 0.002  # patch sides

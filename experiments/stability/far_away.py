@@ -23,6 +23,7 @@ from tilestamp.simulator.scenes import LookAt, Scene
 from tilestamp.simulator.scenes.scene import Mesh, Patches
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import from_mesh
 
+QUESTION = "How far from the origin may a model be before its picture changes?"
 SIZE = 64  # pixels
 AROUND, DOWN = 24, 12  # quads of the sphere
 WRONG = 0.01  # share of the drawn pixels from which we say that it breaks

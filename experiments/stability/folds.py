@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.work import Work
 
+QUESTION = "When does the bit mask lose samples of a folded patch?"
 SLOW = True  # the kernels of the bit mask take longer to compile than all else of the atlas
 
 KINDS: tuple[MaskKind, ...] = ("plain", "facing", "depth")

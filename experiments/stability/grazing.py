@@ -20,6 +20,7 @@ from tilestamp.reports.plots import lines
 from tilestamp.simulator.reference.coverage import exact_visibility
 from tilestamp.simulator.scenes.scene import Scene
 
+QUESTION = "How steep may a plane be before its depth at a sample is wrong?"
 SIZE = 64  # pixels
 BASE, TALLEST = 40.0, 48.0  # pixels
 SPAN = 0.9  # of the depth range, at most, across a triangle

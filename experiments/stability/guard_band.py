@@ -28,6 +28,7 @@ from tilestamp.simulator.scenes.scene import Scene
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "When does clipping one of two neighbours leave holes between them?"
 SIZE = 64  # pixels
 SUBPIXELS = 16
 EDGES = 16  # shared edges, within 20 degrees of the vertical

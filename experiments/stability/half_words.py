@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "When does FreePipe show colours that no triangle has?"
 SIZE = 128  # pixels a side
 GAPS = tuple(2.0**-k for k in range(12, 25))  # NDC depth between the two layers
 TILT = 0.1  # NDC depth from one side of the screen to the other: all last bits occur

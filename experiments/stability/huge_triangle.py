@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How large may one triangle be before FreePipe waits for it alone?"
 SIDE = 1024  # pixels of the screen
 AREAS = tuple(float(2**k) for k in range(1, 20, 2))  # pixels
 MACHINE = "gtx480"  # both pipelines were written for it

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "How many layers do four fragments a pixel stand for?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 
 SIZE = 64  # pixels a side

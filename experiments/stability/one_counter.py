@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "What does it cost when all patches want the same bucket?"
 PATCHES = 40_000
 WIDTH, HEIGHT, TILE = 1600, 1200, 8  # pixels
 SHARES = (0.0, 1e-4, 1e-3, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)

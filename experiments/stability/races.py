@@ -23,6 +23,7 @@ from tilestamp.simulator.simulation import simulate
 if TYPE_CHECKING:
     from tilestamp.simulator.run import Run
 
+QUESTION = "From how many layers on do unordered writes leave wrong pixels?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 
 SIZE = 96  # pixels a side

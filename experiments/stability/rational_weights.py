@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How small may a weight be before a rational patch is diced badly?"
 SIZE = 40  # pixels a side of the screen
 SQUARE = 0.8  # side of the patch over the screen's
 WEIGHTS = tuple(10.0**-k for k in range(7))

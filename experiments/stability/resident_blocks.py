@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "How many triangles can a compaction take whose blocks must all be resident?"
 MACHINES = ("ga104", "rtx3080", "h200")  # cooperative launches need compute capability 6.0
 STATED = 10_000  # triangles: "more than 10k"
 REGISTER_COUNTS = (24, 32, 40, 48, 64, 96, 128)  # a thread

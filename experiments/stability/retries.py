@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.work import Work
 
+QUESTION = "When do CudaRaster's queues overflow, and what does drawing again cost?"
 SIZE = 512  # pixels a side: 16 bins, 4096 tiles
 MACHINE = "gtx480"
 COUNTS = (16, 32, 64, 128, 256, 512)  # triangles over the whole screen

@@ -17,6 +17,7 @@ from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bis
 from tilestamp.experiments.stability.methods import METHODS, QUADS, Cover, quad_lattice, quantized
 from tilestamp.reports.plots import lines
 
+QUESTION = "How near may edges come to samples before a seam has holes or double hits?"
 SIZE = 128  # pixels
 CELL = 16  # pixels between the corners of the mesh
 SHAKE = 3  # pixels at most that a corner is moved: slopes of all kinds, and every quad convex

@@ -28,6 +28,7 @@ from tilestamp.experiments.stability.methods import (
 )
 from tilestamp.reports.maps import value_maps
 
+QUESTION = "From which length : width on do slivers lose their samples?"
 ANGLES = 12  # from 0 to 90 degrees
 PLACES = 12
 CELL = 16  # pixels: no sliver touches another's

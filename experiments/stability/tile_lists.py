@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from tilestamp.simulator.run import Run
 
+QUESTION = "When do Ru's tile lists overflow?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
 
 SIZE = 128  # pixels a side

@@ -18,6 +18,7 @@ from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import LookAt, Scene
 from tilestamp.simulator.scenes.scene import Mesh
 
+QUESTION = "How far apart must two walls be for the nearer one to show?"
 SIZE = 32  # pixels
 NEAR, FAR = 0.1, 1000.0  # planes, in world units
 FARTHER_NEAR = 1.0

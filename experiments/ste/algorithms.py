@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
 from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask
 
+QUESTION = "Which algorithm for testing samples is the fastest, at which area?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINES = ("gtx280", "gtx480", "h200")
@@ -74,6 +75,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Which algorithm wins",
         source=source,
         cells=cells,
+        answer=_answer(table),
         figures=figures,
         notes=notes,
         warnings=[],
@@ -126,6 +128,16 @@ def _winners(table: pd.DataFrame) -> list[str]:
         won = ", ".join(f"{r['area']:g} px {r['algorithm']} ({r['bound']})" for r in best.to_dict("records"))
         notes.append(f"{machine}, fastest: {won}.")
     return notes
+
+
+def _answer(table: pd.DataFrame) -> str:
+    """The winner on the smallest and on the largest polygons of each machine."""
+    best = table.loc[table.groupby(["machine", "area"], sort=False)["ns"].idxmin()]
+    said = []
+    for machine, rows in best.groupby("machine", sort=False):
+        ends = [rows.loc[rows.area == area].iloc[0] for area in (rows.area.min(), rows.area.max())]
+        said.append(f"on the {machine} " + " and ".join(f"{end.algorithm} at {end.area:g} px" for end in ends))
+    return f"Modelled: {'; '.join(said)}."
 
 
 def _figure(table: pd.DataFrame, machine: str) -> Figure:

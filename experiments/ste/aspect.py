@@ -20,6 +20,7 @@ from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 from tilestamp.simulator.stages.yao2011.bit_mask import BitMaskEvent, bit_mask
 
+QUESTION = "What does the bit mask gain on long and narrow polygons?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 ASPECTS = (1, 2, 4, 8, 16, 32)
@@ -60,6 +61,9 @@ def run(progress: Callable[[str], None]) -> Result:
         title="The mask on narrow polygons",
         source=source,
         cells=cells,
+        answer=f"At {ASPECTS[-1]}:1 between {table.gain[table.aspect == ASPECTS[-1]].min():.2f} and "
+        f"{table.gain[table.aspect == ASPECTS[-1]].max():.2f} times the efficiency, by area; at 1:1 between "
+        f"{table.gain[table.aspect == 1].min():.2f} and {table.gain[table.aspect == 1].max():.2f} times.",
         figures=[figure],
         notes=notes,
         warnings=[],

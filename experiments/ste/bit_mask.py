@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 from tilestamp.simulator.stages.yao2011.bit_mask import KINDS, BitMaskEvent, MaskKind, bit_mask
 
+QUESTION = "Does the bit mask raise the hit rate by as much as published?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 HEIGHTS = (96, 192, 384, 768)  # windows of 4:3
@@ -65,11 +66,21 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Bit mask filtering",
         source=SOURCE,
         cells=[*_cells(table), *_reading_cells(found)],
+        answer=_answer(table),
         figures=figures,
         notes=[*_notes(table), *said(found)],
         warnings=warnings,
         tables={"runs": table, "readings": as_table(found)},
     )
+
+
+def _answer(table: pd.DataFrame) -> str:
+    """The gains of each model beside what is published."""
+    gains = {key: table.gain[table.model == key] for key in WANTED}
+    said = [
+        f"{key} gains {gain.min():.2f} to {gain.max():.2f} (published: {WANTED[key]:g})" for key, gain in gains.items()
+    ]
+    return f"In sequence, by level and size: {'; '.join(said)}."
 
 
 def _measure(model: Model, level: int, height: int) -> dict[str, Any]:
@@ -102,7 +113,7 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     rows = table.to_dict("records")
     under = [row for row in rows if row["model"] == "bigguy" and row["ste"] < PAPER_STE]
     for near in sorted(under, key=lambda row: -row["ste"])[:1]:
-        place = f"bigguy level {near['level']}, height {near['height']}"
+        place, frame = f"bigguy level {near['level']}, height {near['height']}", f"bigguy {near['height']}"
         cells.append(
             Cell(
                 place,
@@ -111,17 +122,18 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
                 published=None,
                 ours=near["ste"],
                 status="reported",
+                frame=frame,
             )
         )
-        cells.append(Cell(place, "gain", "x", published=WANTED["bigguy"], ours=near["gain"], aim=0.1))
+        cells.append(Cell(place, "gain", "x", published=WANTED["bigguy"], ours=near["gain"], aim=0.1, frame=frame))
     for row in rows:
         if row["model"] == "cube" and row["level"] == 7:
             place = f"cube 7 rounds, height {row['height']}"
             cells.append(Cell(place, "gain", "x", published=WANTED["cube"], ours=row["gain"], aim=0.1))
     for row in rows:
-        place = f"{row['model']} level {row['level']}, height {row['height']}"
+        place, frame = f"{row['model']} level {row['level']}, height {row['height']}", f"{row['model']} {row['height']}"
         cells += [
-            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported")
+            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported", frame=frame)
             for column, name, unit in REPORTED
         ]
     return cells
@@ -137,6 +149,7 @@ def _reading_cells(found: list[Reading]) -> list[Cell]:
             published=None,
             ours=min(getattr(reading, model), key=lambda gain: abs(gain - wanted)),
             status="reported",
+            frame=model,
         )
         for reading in found
         for model, wanted in WANTED.items()

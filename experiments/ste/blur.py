@@ -33,6 +33,7 @@ from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
 from tilestamp.simulator.work import Work
 
+QUESTION = "How much motion does it take for interleaved sampling to beat interval bounds?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 WAYS = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # pixels moved while the shutter is open
@@ -98,6 +99,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Blur: intervals against interleaving",
         source=source,
         cells=cells,
+        answer=notes[0],
         figures=figures,
         notes=notes,
         warnings=[],

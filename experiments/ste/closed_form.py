@@ -19,6 +19,7 @@ from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_po
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 
+QUESTION = "Does measured sample test efficiency follow the closed form?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 AREAS = (0.25, 0.5, 1.0, 2.0, 4.0, 10.0)
@@ -78,6 +79,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="STE by stamp and area",
         source=source,
         cells=cells,
+        answer=f"Yes in {all_} of {len(table)} cells, by intervals that hold for all cells together with 95 %.",
         figures=[figure],
         notes=notes,
         warnings=[],

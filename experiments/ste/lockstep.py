@@ -20,6 +20,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_s
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 
+QUESTION = "What share of the lanes is at work across polygons, in lockstep and with repacking?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 SCENES = ("teapot", "killeroo", "bigguy")
@@ -42,6 +43,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Lanes at work across polygons",
         source="Luong 2010 (Stanford honours thesis), abstract: 65 % for LOCKSTEP, 85 % for REPACK",
         cells=[_cell(row) for row in rows],
+        answer=_notes(table)[0],
         figures=[Figure("utilisation", lambda path: _plot(table, path))],
         notes=_notes(table),
         warnings=[f"{name} is not on the scene path: its stand-in was drawn" for name in stand_ins],
@@ -82,6 +84,7 @@ def _cell(row: dict[str, Any]) -> Cell:
         ours=row["utilisation"],
         status="reproduced" if compared else "reported",
         aim=0.05 if compared else None,
+        frame=f"{row['scene']} {WIDTH}x{HEIGHT}",
     )
 
 

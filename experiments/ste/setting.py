@@ -5,8 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tilestamp.models.used import note
 from tilestamp.simulator.scenes.camera import fit_camera
 from tilestamp.simulator.scenes.catmull_clark import Surface, subdivide, surface_of
+from tilestamp.simulator.scenes.library import STAND_INS
 from tilestamp.simulator.scenes.quad_cage import Cage, read_cage
 from tilestamp.simulator.scenes.search_path import find_scene
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, from_surface
@@ -40,6 +42,7 @@ def bigguy() -> Model:
     """Give the bigguy's cage, or the cube where it is missing, with a warning."""
     path = find_scene("bigguy.obj")
     if path is None:
+        note(STAND_INS, "bigguy", "bigguy.obj")
         return cube()._replace(
             name="cube (for bigguy)", warning="bigguy.obj is not on the scene path: a cube stands in"
         )

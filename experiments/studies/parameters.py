@@ -9,8 +9,8 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import Meta
 
+from tilestamp.experiments.harness.sources import sources_digest
 from tilestamp.experiments.studies.places import place
-from tilestamp.experiments.studies.sources import sources_digest
 from tilestamp.experiments.studies.values import (
     KNOWN,
     PRICED,

@@ -13,9 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tilestamp.experiments.harness.sources import sources_digest
 from tilestamp.experiments.studies.parameters import Execution, Pricing
 from tilestamp.experiments.studies.record import Number, Recorded
-from tilestamp.experiments.studies.sources import sources_digest
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine
 from tilestamp.models.price import Fidelity

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "At how many layers do atomics lose to sorting?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 MACHINES = ("gtx480", "gtx680", "gtx1080", "h200")
 TRIANGLES, LEG = 1 << 15, 8.0  # each of LEG x LEG / 2 pixels

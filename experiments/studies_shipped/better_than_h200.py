@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "What else could the area of an H200 be spent on, to draw faster?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 MACHINE = "h200"
 SIZE = (1280, 720)

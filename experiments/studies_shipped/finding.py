@@ -36,6 +36,6 @@ def finding(
     )  # fmt: skip
 
 
-def reported(row: str, column: str, unit: str, ours: float | str) -> Cell:
+def reported(row: str, column: str, unit: str, ours: float | str, frame: str = "") -> Cell:
     """A cell beside which nothing is published."""
-    return Cell(row, column, unit, published=None, ours=ours, status="reported")
+    return Cell(row, column, unit, published=None, ours=ours, status="reported", frame=frame)

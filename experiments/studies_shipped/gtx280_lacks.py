@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tilestamp.experiments.eisenacher2010.frames import MACHINE, frame, stand_in_warnings
+from tilestamp.experiments.eisenacher2010.frames import KILLEROO, MACHINE, frame, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.questions.best import Boundary, best_values, boundaries
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "Which number of the GTX 280, changed alone, would have made another tile size the best?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 TILES = (4, 8, 16)
 FACTORS = tuple(2.0**power for power in range(-6, 7) if power)
@@ -45,8 +46,11 @@ def run(progress: Progress) -> Result:
     usual = int(best_values(table[table["factor"] == 1], "tile", ["number"])["best"].iloc[0])
     needed = nearest(boundaries(table, "tile", "factor", ["number"], "milliseconds"), usual)
     now = table[(table["factor"] == 1) & (table["number"] == table["number"].iloc[0])]
-    cells = [reported("as it was", f"{row.tile}x{row.tile} tiles", "ms", row.milliseconds) for row in now.itertuples()]
-    cells += [reported(number, f"factor for {tile}x{tile}", "", at) for (number, tile), at in needed.items()]
+    cells = [
+        reported("as it was", f"{row.tile}x{row.tile} tiles", "ms", row.milliseconds, KILLEROO)
+        for row in now.itertuples()
+    ]
+    cells += [reported(number, f"factor for {tile}x{tile}", "", at, KILLEROO) for (number, tile), at in needed.items()]
     others = [tile for tile in TILES if tile != usual]
     figures = [Figure(f"tiles-of-{tile}", partial(_draw, table, needed, usual, tile)) for tile in others]
     title = "What the GTX 280 lacked: which number, changed alone, makes another tile the best, killeroo, 1600x1200"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+QUESTION = "For which sizes of triangles is software as fast as hardware?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 MACHINES = ("gtx480", "gtx680", "gtx1080", "rtx2080ti", "rtx4090", "h200")
 AREAS = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0)  # pixels a triangle

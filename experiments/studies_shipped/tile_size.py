@@ -12,6 +12,7 @@ from tilestamp.models.machine import list_machines
 if TYPE_CHECKING:
     import pandas as pd
 
+QUESTION = "Which tile size is the fastest, on which machine, at which zoom and bound?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
 TILES, BOUNDS = [4, 8, 16], [2.0, 8.0]
 ZOOM = {"from": 0.5, "to": 8, "points": 4, "scale": "log"}

@@ -18,6 +18,7 @@ from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.library import load_scene
 
+QUESTION = "What does each feature change in the picture?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 SCENE = "CesiumMilkTruck"
@@ -60,8 +61,19 @@ def run(progress: Callable[[str], None]) -> Result:
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]
     return Result(
-        name="zhang2025-pictures", title="Features off and on", source=source, cells=cells, figures=figures, notes=notes
+        name="zhang2025-pictures",
+        title="Features off and on",
+        source=source,
+        cells=cells,
+        figures=figures,
+        notes=notes,
+        answer=_answer(cells),
     )
+
+
+def _answer(cells: list[Cell]) -> str:
+    """The pixels that each feature changes."""
+    return f"Of the pixels: {', '.join(f'{c.row} {float(c.ours):.0f} %' for c in cells if c.unit == '%')}."
 
 
 def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:

@@ -16,6 +16,7 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.stages.zhang2025.pixel_shader import Filter
 from tilestamp.simulator.work import Work
 
+QUESTION = "When do tiled texels save traffic?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
 MACHINE = "ga104"
@@ -48,6 +49,16 @@ def shader(scene: Scene, simt: Simt, layout: str, texture_filter: Filter) -> Wor
     options = BinnedOptions(texture_filter=texture_filter, **LAYOUTS[layout])
     frame = binned(scene, np.eye(4), SIZE, SIZE, simt, options, Executor())
     return next(work for work in frame.works if isinstance(work, Work) and work.stage == "PixelShader")
+
+
+def _answer(cells: list[Cell]) -> str:
+    """Settings in which tiles of 4x4 texels send fewer transactions than rows."""
+    ratios = [float(cell.ours) for cell in cells]
+    fewer = sum(ratio < 1 for ratio in ratios)
+    return (
+        f"In {fewer} of {len(ratios)} settings tiles of 4x4 texels send fewer transactions than rows, "
+        f"{min(ratios):.2f} to {max(ratios):.2f} times as many."
+    )
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -100,6 +111,7 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Texture traffic by layout",
         source=source,
         cells=cells,
+        answer=_answer(cells),
         figures=[figure],
         notes=notes,
         warnings=[],

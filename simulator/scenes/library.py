@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.paths import is_file
+from tilestamp.models.used import note
 from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
@@ -36,6 +37,7 @@ EMBEDDED = {
 LARGE_BYTES, LARGE_TIMES = 2**25, 10  # memory above both (bytes; times the file) is worth a note
 CAGE_BYTES = 1400  # a patch, while a cage becomes patches; measured
 STAND_IN = "stand-in for "  # first words of its name
+STAND_INS = "stand-ins"  # under which a manifest names the models that are not here, each with the file that it lacks
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
 
 
@@ -95,6 +97,7 @@ def stand_in(name: str) -> Scene:
     if name not in NOT_SHIPPED:
         raise TilestampError(f"there is no stand-in for {name!r}, only for {' and '.join(NOT_SHIPPED)}")
     model = NOT_SHIPPED[name]
+    note(STAND_INS, name, f"{name}.bpt")
     cow = load_scene("spot")
     if cow.patches is None:
         raise TilestampError("the embedded cage is damaged: reinstall")
@@ -102,11 +105,11 @@ def stand_in(name: str) -> Scene:
     turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if name in Z_UP else np.eye(3)
     points = cut_like(cow.patches, model).points.astype(np.float64)
     points[..., :3] = (points[..., :3] - points[..., 3:] * (low + high) / 2.0) @ (model.scale * turn).T
-    note = (
+    said = (
         f"stand-in: {model.patches} patches cut from the embedded spot, because {name} ({model.line}) is not here;"
         f" put {name}.bpt on the scene search path (TILESTAMP_SCENES)"
     )
-    scene = with_views(Scene(name, patches=Patches(points.astype(np.float32)), note=note))
+    scene = with_views(Scene(name, patches=Patches(points.astype(np.float32)), note=said))
     return replace(scene, name=STAND_IN + name)
 
 

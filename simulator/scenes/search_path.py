@@ -2,12 +2,18 @@
 
 import os
 from collections.abc import Iterable
+from functools import cache
+from hashlib import file_digest as digest_of_file
 from pathlib import Path
 
 from tilestamp.models.errors import MissingInputError
 from tilestamp.models.nearest_name import did_you_mean
+from tilestamp.models.used import note
 
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
+FILES = "scene files"  # under which a manifest names the files that were looked for, each with its digest
+MISSING = "missing"
+DIGITS = 16  # hexadecimal, of a digest
 LEVELS = 2  # of sub-folders that are looked into
 # Where files of one stem differ in kind, the first of these wins: the paper's patches before a cage before triangles.
 SUFFIXES = (".bpt", ".obj", ".ply", ".glb", ".gltf", ".off", ".stl", ".npz")
@@ -36,11 +42,24 @@ def scene_files(scene_path: SearchPath = None) -> list[Path]:
 
 
 def find_scene(name: str, scene_path: SearchPath = None) -> Path | None:
-    """Find a file by its stem or its whole name on the search path, or None."""
-    for path in scene_files(scene_path):
-        if name in (path.stem, path.name):
-            return path
-    return None
+    """Find a file by its stem or its whole name on the search path, or None; either is noted for manifests."""
+    path = next((path for path in scene_files(scene_path) if name in (path.stem, path.name)), None)
+    note(FILES, name, file_digest(path))
+    return path
+
+
+def file_digest(path: Path | None) -> str:
+    """Digest of a file's bytes, 16 hexadecimal digits; ``missing`` where there is none."""
+    if path is None:
+        return MISSING
+    about = path.stat()
+    return _digest(path, about.st_size, about.st_mtime_ns)
+
+
+@cache
+def _digest(path: Path, _size: int, _modified: int) -> str:
+    with path.open("rb") as file:
+        return digest_of_file(file, "sha256").hexdigest()[:DIGITS]
 
 
 def missing_scene(name: str, known: Iterable[str], scene_path: SearchPath = None) -> MissingInputError:

@@ -45,8 +45,8 @@ class Absent(NamedTuple):
 
 
 NOT_SHIPPED = {
-    "bigguy": Absent(3570, "Bay Raitt's big guy, 3570 patches", 4.27, (-1.311, -1.666), (0.3142, 0.3593, 0.2898)),
-    "killeroo": Absent(11532, "headus's killeroo, 11532 patches", 1.94, (-2.708, -3.349), (0.2265, 0.3401, 0.1792)),
+    "bigguy": Absent(3570, "Bay Raitt's big guy, 3570 patches", 4.231, (-1.311, -1.666), (0.3142, 0.3593, 0.2898)),
+    "killeroo": Absent(11532, "headus's killeroo, 11532 patches", 1.949, (-2.708, -3.349), (0.2265, 0.3401, 0.1792)),
 }
 
 
