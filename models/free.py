@@ -33,7 +33,7 @@ SCHEDULE_TERMS = ("balance", "tail")
 _Numbers = dict[str, dict[str, tuple[str, ...]]]  # by term and section
 _RATES: _Numbers = {
     "l1": {"memory": ("l1_bytes_per_clock", "l1_write_bytes_per_clock")},
-    "dram": {"memory": ("dram_gb_per_s",)},
+    "dram": {"memory": ("dram_gb_per_s", "l2_gap_lines_per_clock")},
     "l2": {
         "memory": (
             "l2_bytes_per_clock",
@@ -139,5 +139,5 @@ def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:
     count = len(alone)
     return max(
         float(alone.sum()) / min(places, count),
-        units.start + float(units.sm.sum()) / min(units.sms, count),
+        units.pace.start + float(units.sm.sum()) / min(units.sms, count),
     )
