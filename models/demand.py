@@ -94,7 +94,7 @@ class Whole(NamedTuple):
     issue, shared, l1, chain : float
         Sums.
     way : float
-        The shortest chain; 0 where there is no unit.
+        The shortest way to memory and back: of a unit's start and chain, a share a round trip; 0 where there is none.
     """
 
     issue: float
@@ -233,5 +233,6 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
             waited = issue * others[Other.BESIDE] + l1 * others[Other.IN_STEP]
             found.alone[unit] = max(chain + waited, found.scheduler[unit])
             issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
-            way = min(way, chain)
+            trips = max(1.0, events[E.CHAIN_LOAD, unit] + events[E.CHAIN_ATOMIC, unit])
+            way = min(way, others[Other.START] + row[Sum.CHAIN] / trips)
     return Whole(issues, shareds, l1s, chains, way)

@@ -139,5 +139,5 @@ def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:
     count = len(alone)
     return max(
         float(alone.sum()) / min(places, count),
-        units.start + float(units.sm.sum()) / min(units.sms, count),
+        units.pace.start + float(units.sm.sum()) / min(units.sms, count),
     )

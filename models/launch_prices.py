@@ -76,20 +76,20 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
     sm, own, alone = np.empty(count), np.empty(count), np.empty(count)
     sizes = events[E.LOAD_BYTES] + events[E.STORE_BYTES]
     seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
-    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
         matrix = rates(launch, machine, moved_of(fact), totals)
         if (matrix != seen).any():
             whole = demands(events, matrix, units)
             load_units(units, sm, own, alone)
-            seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0)
+            seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         terms = bound_terms(launch, whole, totals, machine, fact)
         row[:TAIL] = terms
         if scheduled:
             loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, fact)
-            queue = terms[Term.QUEUE] if launch.drawn else loaded.memory
-            now = (float(loaded.places), float(loaded.sms), loaded.interval, loaded.start, queue)
+            queue, pace = terms[Term.QUEUE] if launch.drawn else loaded.memory, loaded.pace
+            now = (float(loaded.places), float(loaded.sms), pace.interval, pace.start, pace.slower, queue)
             if now != settled:
                 played, settled = play(loaded), now
             schedule_launch(loaded, played, terms, loaded.sms < machine[M.SM_COUNT], row)

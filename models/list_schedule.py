@@ -27,6 +27,24 @@ class Record(NamedTuple):
     place: Any
 
 
+class Pace(NamedTuple):
+    """How fast units follow each other, and go.
+
+    Parameters
+    ----------
+    interval : float
+        From one start to the next, at least.
+    start : float
+        From a free place to the first instruction of the unit put there.
+    slower : float
+        Times that a unit's own time is longer while memory is busy; 1: it is not.
+    """
+
+    interval: float
+    start: float
+    slower: float
+
+
 @kernel
 def record_of(units: int) -> Record:
     """Room for so many units."""
@@ -35,12 +53,12 @@ def record_of(units: int) -> Record:
 
 @kernel
 def list_schedule(
-    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, interval: float, start: float, record: Record
+    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace, record: Record
 ) -> tuple[float, float]:
     """End of all units; the start of the one that ends last; each unit's in ``record``, if that has room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
-    taken does not start at once later.
+    taken does not start at once later. Until memory has served all, units go on as slowly as ``pace`` says.
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
     there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
@@ -49,7 +67,8 @@ def list_schedule(
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
     drawn = moved = end = last_start = 0.0
-    begun = -interval
+    interval, start, slower = pace
+    begun, busy = -interval, moves.sum() if len(moves) > 0 else 0.0
     for i in range(units):
         begun += interval
         if i >= places:
@@ -64,7 +83,8 @@ def list_schedule(
         if len(moves) > 0:
             moved = max(moved, begun + start) + moves[i]
             done = max(done, moved)
-        done = max(done, begin + alone[i])
+        waited = min((slower - 1.0) * alone[i], (1.0 - 1.0 / slower) * max(0.0, busy - begin))
+        done = max(done, begin + alone[i] + waited)
         if len(record.start) > 0:
             record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
         if done > end:

@@ -16,6 +16,7 @@ Size = Annotated[int, msgspec.Meta(ge=0, le=MOST_BYTES)]
 Positive = Annotated[float, msgspec.Meta(ge=1e-3, le=1e6)]
 Amount = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 Slot = Annotated[float, msgspec.Meta(ge=1 / 64, le=1e4)]  # cycles of an instruction
+Ratio = Annotated[float, msgspec.Meta(ge=1, le=1e3)]
 Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
 Sms = Annotated[int, msgspec.Meta(ge=1, le=1 << 16)]
 
@@ -113,11 +114,13 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bank_bytes: Literal[4, 8] = 4  # that a bank serves a pass
     bank_mode_bytes: Literal[4, 8] = 4  # consecutive words of this size lie in consecutive banks
     l2_kept_share: Share = 1.0  # of l2_bytes, for data that all SMs use: halves keep copies of each other's
+    l2_dirty_share: Share = 1.0  # of l2_bytes, at most written and not yet in DRAM
     l2_read_lines_per_clock: Amount = 0.0  # lines fetched in part, which take this besides their bytes; 0: nothing
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
     l2_write_lines_per_clock: Amount = 0.0  # as l2_read_lines_per_clock, for stores
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
     l1_line_cycles: Amount = 0.0  # of one SM, for a line fetched or stored in part, besides its bytes
+    loaded_latency: Ratio = 1.0  # times that a block takes longer by itself while DRAM or L2 serves the launch
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

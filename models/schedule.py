@@ -13,7 +13,9 @@ longest one of each SM, a share an SM.
 as there are SMs. A block's first request comes a block start after it got its place.
 
 *Memory.* DRAM or L2, the fuller of the two, serves the bytes of blocks in order. So blocks that find nothing to do
-start only when those before them, which have, leave their places.
+start only when those before them, which have, leave their places. Blocks that start together want it together and
+leave together, so that it idles while the next ones start: until it has served all, a block goes on more slowly by
+itself (``Pace.slower``, measured: 1 where it was not).
 
 *What it draws from.* An item of a queue begins when the draws before it have passed the fullest atomic unit.
 
@@ -41,7 +43,7 @@ from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
 from tilestamp.models.demand import IN_THE_WAY, Demand
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
-from tilestamp.models.list_schedule import Record, list_schedule, record_of
+from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of
 from tilestamp.models.numbers import Number as M
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
@@ -66,16 +68,14 @@ class Loads(NamedTuple):
         Units that the machine holds together.
     sms : int
         SMs that get any.
-    interval : float
-        Cycles from one start to the next; 0 where units are drawn from a queue.
-    start : float
-        Cycles from a free place to the first instruction of the block put there; 0 where units are drawn.
+    pace : Pace
+        In cycles; ``interval`` and ``start`` are 0 where units are drawn from a queue.
     begun : float
         Cycles before persistent blocks draw their first units.
     memory, atomic : float
         Cycles of the fuller of DRAM and L2, and of the atomic units; draws are not among them.
     way : float
-        Cycles before their first request and after their last.
+        Cycles before their first request and after their last: one round trip of the shortest chain.
     """
 
     sm: NDArray[np.float64]
@@ -85,8 +85,7 @@ class Loads(NamedTuple):
     moves: NDArray[np.float64]
     places: int
     sms: int
-    interval: float
-    start: float
+    pace: Pace
     begun: float
     memory: float
     atomic: float
@@ -153,10 +152,12 @@ def loads(
     memory = max(terms[Term.DRAM], terms[Term.L2])
     if not launch.drawn:
         atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
-        moves, interval = _shares(sizes, memory), terms[Term.START] / max(1, count)
-        return Loads(sm, own, alone, np.empty(0), moves, places, sms, interval, start, 0.0, memory, atomic, way)
+        moves = _shares(sizes, memory)
+        pace = Pace(terms[Term.START] / max(1, count), start, machine[M.MEMORY_LOADED_LATENCY])
+        return Loads(sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way)
     draws = _shares(requests, terms[Term.QUEUE])
-    return Loads(sm, own, alone, draws, np.empty(0), places, sms, 0.0, 0.0, start, memory, terms[Term.ATOMIC], way)
+    pace = Pace(0.0, 0.0, 1.0)
+    return Loads(sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way)
 
 
 @kernel
@@ -190,7 +191,7 @@ def play(units: Loads) -> Played:
 def ends(units: Loads, alone: Any, places: int, record: Record) -> tuple[float, float]:
     """``list_schedule`` of what the units load the machine with."""
     loads = units.sm, alone, units.draws, units.moves
-    return list_schedule(*loads, places, units.sms, units.interval, units.start, record)  # type: ignore[no-any-return]
+    return list_schedule(*loads, places, units.sms, units.pace, record)  # type: ignore[no-any-return]
 
 
 @kernel

@@ -3,19 +3,19 @@
 Without a cache every byte of every transaction goes to DRAM. With an L2, a launch fetches the part of each buffer's
 footprint that no earlier launch of the frame left there; bytes beyond the footprint are read again and miss only by
 the share in which all footprints of the launch together (or the span that a stream names) exceed the cache. Stores
-stay in the cache until something pushes them out (write-back), and the launch that does so pays. What is in the cache
-is kept by buffer, least recently used first: a frame's launches hand whole buffers to each other, so buffers and not
-lines are what is reused.
+stay in the cache until something pushes them out (write-back), and the launch that does so pays (``models.cache``).
+A frame's launches hand whole buffers to each other, so buffers and not lines are what is reused.
 
 Where L1 keeps what its SM loaded (compute capability 7.0 on), units that ask for the same segment find it there only
 if the other ran on the same SM. With S of them and units dealt at random, a segment that k units ask for comes from L2
 ``S (1 - (1 - 1/S)^k)`` times: hardly less than k for few, at most S for many.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
+from tilestamp.models.cache import Cache
 from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch, Stream
 from tilestamp.models.machine import Machine
@@ -48,14 +48,6 @@ class Traffic(NamedTuple):
     from_l1: float = 0.0
 
 
-@dataclass
-class _Resident:
-    """Bytes of one buffer in the cache, and how many of them DRAM does not have yet."""
-
-    size: float
-    dirty: float
-
-
 def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[Traffic]:
     """Bytes of each launch of a frame, in launch order.
 
@@ -67,7 +59,7 @@ def traffic(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> list[T
     machine : Machine
     """
     caches = caches_of(machine)
-    l2 = _Cache(caches.l2_bytes)
+    l2 = Cache(caches.l2_bytes, caches.dirty_bytes)
     return [_launch_traffic(_streams(launch), caches.l1_sms, l2) for launch in launches]
 
 
@@ -78,19 +70,23 @@ class Caches(NamedTuple):
     ----------
     l2_bytes : int
         That L2 keeps of what all SMs use.
+    dirty_bytes : int
+        That it holds at most of what was written and DRAM does not have yet.
     l1_sms : int
         SMs whose L1 keeps what they loaded; 0: none does.
     """
 
     l2_bytes: int
+    dirty_bytes: int
     l1_sms: int
 
 
 def caches_of(machine: Machine) -> Caches:
     """The caches of a machine."""
     keeps = float(machine.compute_capability) >= L1_HOLDS_LOADS
-    kept = round(machine.memory.l2_bytes * machine.memory.l2_kept_share)
-    return Caches(kept, machine.sm.count if keeps else 0)
+    memory = machine.memory
+    kept, dirty = (round(memory.l2_bytes * share) for share in (memory.l2_kept_share, memory.l2_dirty_share))
+    return Caches(kept, dirty, machine.sm.count if keeps else 0)
 
 
 def _past_l1(streams: tuple[Stream, ...], sms: int) -> tuple[Stream, ...]:
@@ -126,21 +122,22 @@ def _streams(launch: Launch | PipeLaunch) -> tuple[Stream, ...]:
     return Stream(f"{name} loads", "load", loads, loads), Stream(f"{name} stores", "store", stores, stores)
 
 
-def _launch_traffic(requested: tuple[Stream, ...], l1_sms: int, cache: "_Cache") -> Traffic:
+def _launch_traffic(requested: tuple[Stream, ...], l1_sms: int, cache: Cache) -> Traffic:
     streams = _past_l1(requested, l1_sms)
     moved = float(sum(stream.bytes for stream in streams))
     lines = _lines(streams, "load"), _lines(streams, "store")
     if cache.capacity == 0:
         return Traffic(moved, 0.0, 1.0, 0.0, *lines)
-    working_set = sum(_footprints(streams).values())
-    passed = max(0.0, working_set - cache.capacity)  # pushes out what lies there before it is reached
-    dram = loaded = missed = 0.0
+    footprints = _footprints(streams)
+    working_set = sum(footprints.values())
+    found, dram = cache.run(footprints, _footprints(stream for stream in streams if stream.op != "load"))
+    loaded = missed = 0.0
     for stream in streams:
         footprint = min(stream.footprint_bytes, stream.bytes)
         span = stream.span_bytes or working_set
         reuse = (stream.bytes - footprint) * max(0.0, 1.0 - cache.capacity / span) if span else 0.0  # what misses
-        fetched = 0.0 if stream.op == "store" else max(0.0, footprint - max(0.0, cache.holds(stream.buffer) - passed))
-        dram += fetched + reuse + cache.touch(stream.buffer, footprint, written=stream.op != "load")
+        fetched = 0.0 if stream.op == "store" else max(0.0, footprint - found[stream.buffer])
+        dram += fetched + reuse
         if stream.op == "load":
             loaded += stream.bytes
             missed += fetched + reuse
@@ -161,49 +158,9 @@ def _lines(streams: tuple[Stream, ...], op: str) -> float:
     return sum(stream.lines_in_part for stream in streams if stream.op == op)
 
 
-def _footprints(streams: tuple[Stream, ...]) -> dict[str, int]:
+def _footprints(streams: Iterable[Stream]) -> dict[str, int]:
     """Footprint by buffer: the largest of its streams."""
     sizes: dict[str, int] = {}
     for stream in streams:
         sizes[stream.buffer] = max(sizes.get(stream.buffer, 0), min(stream.footprint_bytes, stream.bytes))
     return sizes
-
-
-class _Cache:
-    """Least recently used by buffer, write-back."""
-
-    def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
-        self._buffers: dict[str, _Resident] = {}  # oldest first
-
-    def holds(self, buffer: str) -> float:
-        """Bytes of the buffer that are in the cache."""
-        entry = self._buffers.get(buffer)
-        return entry.size if entry else 0.0
-
-    def touch(self, buffer: str, footprint: float, *, written: bool) -> float:
-        """Use a buffer; return the bytes that were written back to make room."""
-        entry = self._buffers.pop(buffer, _Resident(0.0, 0.0))
-        back = max(0.0, footprint - self.capacity) if written else 0.0  # what never fits goes through
-        entry.size = min(max(entry.size, footprint), self.capacity)
-        entry.dirty = min(max(entry.dirty, footprint), self.capacity) if written else entry.dirty
-        self._buffers[buffer] = entry
-        return back + self._evict()
-
-    def _evict(self) -> float:
-        """Push out the oldest bytes until all fits; return what had to be written."""
-        excess = sum(entry.size for entry in self._buffers.values()) - self.capacity
-        back = 0.0
-        for name in list(self._buffers):
-            if excess <= 0:
-                break
-            entry = self._buffers[name]
-            out = min(entry.size, excess)
-            written = entry.dirty * out / entry.size if entry.size else 0.0
-            back += written
-            entry.dirty -= written
-            entry.size -= out
-            excess -= out
-            if entry.size == 0:
-                del self._buffers[name]
-        return back

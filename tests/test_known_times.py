@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.pricing import microseconds, schedule
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
-from tilestamp.models.list_schedule import list_schedule, record_of
+from tilestamp.models.list_schedule import Pace, list_schedule, record_of
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.traffic import Traffic
 
@@ -26,8 +26,9 @@ NOTHING = Traffic(0.0, 0.0, 1.0)
     sms=st.integers(1, 9),
     queue=st.booleans(),
     moving=st.booleans(),
+    slower=st.floats(1.0, 5.0),
 )
-def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, queue, moving):
+def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, queue, moving, slower):
     """The same by two lists that are sorted after each unit."""
     random = np.random.default_rng(seed)
     sm, alone, draws, moves = (random.exponential(size, units) for size in (2.0, 9.0, 0.5, 0.8))
@@ -37,12 +38,22 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
         served[0] = max(served[0], begun + 0.7) + sm[i]
         drawn = max(drawn, begun) + draws[i]
         moved = max(moved, begun + 0.7) + moves[i] if moving else 0.0
-        free[0] = max(served[0], moved, (drawn if queue else begun) + alone[i])
+        begin = drawn if queue else begun
+        busy = max(0.0, moves.sum() - begin) if moving else 0.0  # in which a unit gets 1 / slower as far
+        own = slower * alone[i] if slower * alone[i] < busy else busy + alone[i] - busy / slower
+        free[0] = max(served[0], moved, begin + own)
         end = max(end, free[0])
         free, served = sorted(free), sorted(served)
     nothing = np.empty(0)
     got = list_schedule(
-        sm, alone, draws if queue else nothing, moves if moving else nothing, places, sms, 0.3, 0.7, record_of(0)
+        sm,
+        alone,
+        draws if queue else nothing,
+        moves if moving else nothing,
+        places,
+        sms,
+        Pace(0.3, 0.7, slower),
+        record_of(0),
     )
     assert got[0] == pytest.approx(end, rel=1e-12)
 
@@ -50,7 +61,16 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
 def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_later():
     """One place: a block of 10 from 0 on, then empty blocks at 10, 11, 12 and 13."""
     nothing, alone = np.zeros(5), np.array([10.0, 0.0, 0.0, 0.0, 0.0])
-    assert list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, 1.0, 0.0, record_of(0))[0] == 13.0
+    found = list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, Pace(1.0, 0.0, 1.0), record_of(0))
+    assert found[0] == 13.0
+
+
+@pytest.mark.parametrize(("busy", "end"), [(0.0, 10.0), (6.0, 14.0), (30.0, 30.0), (15.0, 20.0)])
+def test_a_block_goes_more_slowly_while_memory_is_busy(busy, end):
+    """Of 10 cycles 2 pass in 6 that memory serves at a third of the pace: 8 are left. All 10 pass in 30."""
+    nothing, alone = np.zeros(1), np.array([10.0])
+    found = list_schedule(nothing, alone, np.empty(0), np.array([busy]), 1, 1, Pace(1.0, 0.0, 3.0), record_of(0))
+    assert found[0] == pytest.approx(end)
 
 
 def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
@@ -70,7 +90,12 @@ def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
     )
 
 
-AT_ONCE = altered(H200, {"launch.blocks_per_us": 1e6}, "assumed", "a test: blocks start together")
+AT_ONCE = altered(
+    H200,
+    {"launch.blocks_per_us": 1e6, "memory.loaded_latency": 1.0},
+    "assumed",
+    "blocks start together, and go on alike",
+)
 START, DRAM = AT_ONCE.latency.block_launch_cycles, AT_ONCE.latency.dram_cycles
 OVERHEAD = AT_ONCE.launch.kernel_us * AT_ONCE.sm.clock_mhz
 ALL_SHARED = 200_000  # bytes: a block leaves no room for another

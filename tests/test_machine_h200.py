@@ -1,11 +1,12 @@
-"""The description of the H200 against the measurements that it was made from: atomics of whole launches."""
+"""The description of the H200 against measurements that it was made from: atomics, loads while memory is busy."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.pricing import bounds
+from tests.pricing import bounds, schedule
 from tilestamp.models.atomics import add_requests
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
@@ -13,6 +14,7 @@ from tilestamp.models.machine import load_machine
 from tilestamp.models.traffic import Traffic
 
 H200 = load_machine("h200")
+SILICON = Path(__file__).parents[1] / "experiments" / "silicon" / "measured"
 WARPS = 2048
 
 
@@ -78,3 +80,43 @@ def test_words_shared_by_all_warps_run_as_fast_as_measured(measured, words):
 def test_addresses_spread_over_lines_run_as_fast_as_measured(measured, spacing):
     ours = giga_per_second(same_for_all_warps(np.arange(32) * spacing))
     assert ours == pytest.approx(measured[f"atom_32addr_allwarps_spacing{spacing}B"], rel=0.3)
+
+
+def waves():
+    """Microseconds that grids of blocks took, by what a warp loads, block, dependent loads of each and grid."""
+    with (SILICON / "loaded_latency.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["group"] == "waves"]
+    return {
+        (row["pattern"], int(row["case"].split()[0]), int(row["steps"]), int(row["count"])): float(row["value"])
+        for row in rows
+    }
+
+
+def wave(pattern, block, steps, grid):
+    """Instructions of a step: an address is mixed from the one before."""
+    warps, sectors = block // 32, {"sector": 32, "line": 4, "quad": 16}[pattern]
+    counts = {
+        "INT32": 14 * steps + 8,
+        "MUL32": 3 * steps,
+        "CONTROL": 2 * steps + 4,
+        "LOAD": steps,
+        "LOAD_BYTES": 32 * sectors * steps,
+    }
+    events = np.zeros((grid, EVENTS))
+    for name, count in counts.items():
+        events[:, MachineEvent[name]] = warps * count
+    events[:, MachineEvent.CHAIN_LOAD], events[:, MachineEvent.CHAIN_ALU] = steps, 22 * steps + 10
+    moved = Traffic(0.0, float(events[:, MachineEvent.LOAD_BYTES].sum()), 0.0)
+    moved = moved._replace(read_lines=moved.l2_bytes / 32 * (pattern == "sector"))
+    about = {"stage": "s", "kernel": "k", "registers": 24, "shared_bytes": 56000 * (block == 128)}
+    return schedule(Launch(grid=grid, block=block, events=events, **about), H200, moved)
+
+
+def test_blocks_that_wait_for_memory_follow_each_other_as_slowly_as_measured():
+    """Where memory would take twice as long as the places, a block stays 2.2 times as long as a lone one."""
+    before = H200.launch.kernel_us + H200.latency.block_launch_cycles / H200.sm.clock_mhz
+    ratios = {key: (1e3 * wave(*key).milliseconds - before) / us for key, us in waves().items()}
+    several = [ratio for (_, block, _, grid), ratio in ratios.items() if grid > 132 * (8 if block == 256 else 4)]
+    assert len(ratios) == 120
+    assert np.abs(np.log(several)).mean() < 0.08
+    assert np.abs(np.log(list(ratios.values()))).mean() < 0.12

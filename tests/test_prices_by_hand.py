@@ -34,6 +34,8 @@ ROUND = {  # 2 SMs at 1 GHz: a cycle is a nanosecond
     "memory.dram_gb_per_s": 100.0,
     "memory.dram_efficiency": 0.5,
     "memory.l2_kept_share": 1.0,
+    "memory.l2_dirty_share": 1.0,
+    "memory.loaded_latency": 1.0,
     "memory.l2_bytes_per_clock": 64.0,
     "memory.l2_write_bytes_per_clock": 16.0,
     "memory.l1_bytes_per_clock": 32.0,

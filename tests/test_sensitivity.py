@@ -9,7 +9,7 @@ from tilestamp.simulator.why import movers, sentences
 
 COSTS = ("issue", "pipe", "latency", "memory.bank_pass", "atomics.unit_ns", "atomics.conflict", "launch.kernel")
 RATES = ("sm.clock_mhz", "memory.dram_gb_per_s", "launch.blocks_per_us", "fixed_function.clock_mhz")
-NOT_RATES = ("sm.clock_mhz", "fixed_function.clock_mhz", "memory.dram_efficiency")  # others follow them
+NOT_RATES = ("sm.clock_mhz", "fixed_function.clock_mhz", "memory.dram_efficiency", "memory.loaded_latency")  # or ratios
 
 
 @pytest.fixture(scope="module", params=["gtx280", "h200"])

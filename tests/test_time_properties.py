@@ -20,7 +20,14 @@ ROUNDING = 1 + 1e-9
 COUNTED = ("sm.warp_size", "memory.bank", "memory.l2_line_bytes", "fixed_function", "identity")  # they change counts
 HASHED = ("atomics.unit_bytes", "atomics.units")  # they change which counters meet, for better or worse
 UNPRICED = ("latency.l2_far_cycles", "launch.stream_us", "launch.graph_us", "launch.sync_us")
-COSTS = ("atomics.unit_ns", "atomics.spread_ns", "atomics.conflict_ns", "memory.l1_line_cycles", "launch.kernel_us")
+COSTS = (
+    "atomics.unit_ns",
+    "atomics.spread_ns",
+    "atomics.conflict_ns",
+    "memory.l1_line_cycles",
+    "memory.loaded_latency",
+    "launch.kernel_us",
+)
 LESS = ("issue.", "pipe.", "latency.", "sm.reserved", *COSTS)
 GRANTED = ("sm.register_unit", "sm.warp_granularity", "sm.shared_unit_bytes")  # a smaller unit may waste more
 EVENT_NAMES = [event.name for event in MachineEvent if event.name not in ("LANES", "ATOMIC_LANES", "ATOMIC_DEPTH")]
