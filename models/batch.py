@@ -75,7 +75,7 @@ class Batch:
         facts = np.empty((len(self.machines), len(Fact)))
         held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
         facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
-        facts[:, Fact.DRAM_BYTES : Fact.FROM_L1 + 1] = moved
+        facts[:, Fact.DRAM_BYTES : Fact.GAP_LINES + 1] = moved
         facts[:, Fact.FULLEST_NS] = 0.0
         if launch.atomic_requests is not None:
             fullest = [fullest_unit_ns(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]

@@ -6,7 +6,8 @@ shared    passes through shared memory, all SMs equally busy
 l1        bytes between registers and the memory system, all SMs equally busy
 balance   where the blocks are fewer than the SMs: the fullest of issue, shared and l1 on the SMs that get any
 latency   Little's law: dependent chains of all units / units that are resident together
-dram, l2  bytes / bandwidth, and in L2 lines moved in part; stores may be slower than loads
+dram, l2  bytes / bandwidth, and in L2 lines moved in part; stores may be slower than loads; in DRAM lines stored with
+          gaps, of which the rest is fetched before they are written
 atomic    requests and conflicts / rate of all atomic units
 queue     time of the fullest atomic unit: contention. Where atomics lock DRAM, a request that waits for its lock
           holds up those behind it, so that the queue adds to ``atomic``; L2 units wait side by side with the rest
@@ -79,7 +80,8 @@ class Fact(IntEnum):
     READ_LINES = 5
     WRITTEN_LINES = 6
     FROM_L1 = 7
-    FULLEST_NS = 8  # that the atomic unit with the most to do is busy
+    GAP_LINES = 8
+    FULLEST_NS = 9  # that the atomic unit with the most to do is busy
 
 
 @kernel
@@ -93,6 +95,7 @@ def moved_of(facts: Any) -> Traffic:
         facts[Fact.READ_LINES],
         facts[Fact.WRITTEN_LINES],
         facts[Fact.FROM_L1],
+        facts[Fact.GAP_LINES],
     )
 
 
@@ -139,6 +142,8 @@ def _chip_terms(terms: Any, totals: Any, machine: Any, facts: Any) -> None:
     clock_hz = machine[M.SM_CLOCK_MHZ] * 1e6
     dram_bytes_per_s = machine[M.MEMORY_DRAM_GB_PER_S] * 1e9 * machine[M.MEMORY_DRAM_EFFICIENCY]
     terms[Term.DRAM] = facts[Fact.DRAM_BYTES] / (dram_bytes_per_s / clock_hz)
+    if machine[M.MEMORY_L2_GAP_LINES_PER_CLOCK]:
+        terms[Term.DRAM] += facts[Fact.GAP_LINES] / machine[M.MEMORY_L2_GAP_LINES_PER_CLOCK]
     if machine[M.MEMORY_L2_BYTES]:
         read, written = machine[M.MEMORY_L2_BYTES_PER_CLOCK], facts[Fact.WRITTEN_BYTES]
         stores = written / (machine[M.MEMORY_L2_WRITE_BYTES_PER_CLOCK] or read)

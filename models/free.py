@@ -33,7 +33,7 @@ SCHEDULE_TERMS = ("balance", "tail")
 _Numbers = dict[str, dict[str, tuple[str, ...]]]  # by term and section
 _RATES: _Numbers = {
     "l1": {"memory": ("l1_bytes_per_clock", "l1_write_bytes_per_clock")},
-    "dram": {"memory": ("dram_gb_per_s",)},
+    "dram": {"memory": ("dram_gb_per_s", "l2_gap_lines_per_clock")},
     "l2": {
         "memory": (
             "l2_bytes_per_clock",

@@ -34,6 +34,11 @@ class Stream:
         Lines of 128 bytes that its requests touch in part, counted once a request: each costs more than its bytes. Of
         ``requested_bytes``, where those are given.
         None: not counted; then loads fill their lines, and of stores each sector of 32 bytes lies in a line of its own.
+    pair_bytes : int
+        As ``footprint_bytes``, of the pairs of sectors touched, where they are more: DRAM may send both. 0: the same.
+    gaps : bool
+        Whether what is stored leaves bytes of nearly every line as they were, as records with padding do: before such
+        a line goes back to DRAM, the rest of it is fetched.
     """
 
     buffer: str
@@ -43,6 +48,8 @@ class Stream:
     span_bytes: int = 0
     requested_bytes: int = 0
     partial_lines: int | None = None
+    pair_bytes: int = 0
+    gaps: bool = False
 
     @property
     def lines_in_part(self) -> float:

@@ -118,6 +118,9 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     l2_read_lines_per_clock: Amount = 0.0  # lines fetched in part, which take this besides their bytes; 0: nothing
     l2_write_bytes_per_clock: Amount = 0.0  # as l2_bytes_per_clock, for stores; 0: the same
     l2_write_lines_per_clock: Amount = 0.0  # as l2_read_lines_per_clock, for stores
+    l2_gap_lines_per_clock: Amount = 0.0  # stored with gaps and written back, besides their bytes; 0: nothing
+    l2_gap_share: Share = 1.0  # of l2_bytes that such lines may take: those beyond are written back at once
+    dram_fetch_bytes: Count = 32  # that a miss brings in
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
     l1_line_cycles: Amount = 0.0  # of one SM, for a line fetched or stored in part, besides its bytes
     loaded_latency: Ratio = 1.0  # times that a block takes longer by itself while DRAM or L2 serves the launch

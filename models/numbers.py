@@ -70,6 +70,7 @@ class Number(IntEnum):
     MEMORY_DRAM_GB_PER_S = 46
     MEMORY_DRAM_EFFICIENCY = 47
     LAUNCH_KERNEL_US = 48
+    MEMORY_L2_GAP_LINES_PER_CLOCK = 49
 
 
 _read = attrgetter(*(number.name.lower().replace("_", ".", 1) for number in Number))

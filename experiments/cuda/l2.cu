@@ -13,6 +13,17 @@ extern "C" __global__ void look(const uint4* a, u64 n, u32* out) {
   if ((v.x ^ v.y ^ v.z ^ v.w) == 0x12345678u) *out = v.x;
 }
 
+// Records of `words` words of 8 bytes, a thread a record, of which the first `stored` words are written; a word of each.
+extern "C" __global__ void records(u64* a, u32 n, u32 words, u32 stored, u64 value) {
+  u32 i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= n) return;
+  for (u32 k = 0; k < stored; k++) a[(u64)i * words + k] = value + k;
+}
+extern "C" __global__ void look_records(const u64* a, u32 n, u32 words, u32* out) {
+  u32 i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i < n && a[(u64)i * words + words - 1] == 0x12345678u) *out = i;
+}
+
 // One SM adds at two words at a time, half of its lanes at each: it takes longer where one unit owns both.
 static __device__ __forceinline__ int both(u32* a, u32 one, u32 other, int rounds) {
   u32* word = a + (threadIdx.x & 1 ? one : other);

@@ -79,7 +79,7 @@ def tiled(
         capacity=options.capacity,
     )
     visible, (raster,), _ = execute(
-        tiled_raster, vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile
+        tiled_raster, vertices.screen, mesh.triangles, lists, width, height, simt, tile=tile, gaps=not options.ssao
     )
     fragments = interpolate(mesh, vertices, visible, perspective=options.perspective)
     light = np.ones((height, width), np.float32)

@@ -23,13 +23,13 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.fragment_shading import Fragments
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, by_warp
 from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, EyeSpace, Samples
 from tilestamp.simulator.stages.thread_per_item import Access, ThreadEvent, thread_per_item
 from tilestamp.simulator.work import Work
 
 SAMPLES = 64
 SAMPLED = 100  # sectors that a drawn pixel reads besides: 64 samples and what they are compared with (H200: 94 to 112)
-RECORD_BYTES = 64  # fragment with its occlusion
 FRAGMENT_WORDS = 7
 NOISE = 4  # pixels on a side of the noise texture
 RADIUS = 0.05  # of the distance from the eye
@@ -149,7 +149,7 @@ def ambient_occlusion(
 
 def _work(drawn: NDArray[np.bool_], simt: Simt) -> Work:
     """A thread a pixel; the samples' directions are the same words for all lanes."""
-    loads, stores = (Access("fragments", RECORD_BYTES, FRAGMENT_WORDS),), (Access("occlusion", RECORD_BYTES, 1),)
+    loads, stores = (Access("fragments", FRAGMENT_BYTES, FRAGMENT_WORDS),), (Access("fragments", FRAGMENT_BYTES, 1),)
     by_block = by_warp(drawn).reshape(-1, BLOCK).sum(axis=1)
     idle = len(by_block) - -(-drawn.size // BLOCK)  # blocks of 8x8 that the picture's edges cut
     work = thread_per_item("ambient_occlusion", "ambient_occlusion", drawn.size, BLOCK, simt, loads, stores, idle)
@@ -159,5 +159,7 @@ def _work(drawn: NDArray[np.bool_], simt: Simt) -> Work:
     work.table[:, ThreadEvent.LOAD_TRANSACTIONS] += read
     work.table[:, ThreadEvent.LOAD_BYTES] += segment * read
     total = segment * int(sampled.sum())
-    fetched = Stream("fragments", "load", total, min(total, RECORD_BYTES * drawn.size), partial_lines=total // segment)
+    fetched = Stream(
+        "fragments", "load", total, min(total, FRAGMENT_BYTES * drawn.size), partial_lines=total // segment
+    )
     return replace(work, streams=(*work.streams, fetched))

@@ -16,6 +16,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes.texture import TextureChains, add_bilinear, nearest
 from tilestamp.simulator.scenes.textured_mesh import Geometry
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.ru2016.clear import memset
 from tilestamp.simulator.stages.ru2016.compiled import words
 from tilestamp.simulator.stages.ru2016.fragment_shading_work import BLOCK, shading_work
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
@@ -167,7 +168,7 @@ def fragment_shading(
     *,
     texture_filter: Filter,
 ) -> StageResult[NDArray[np.uint8]]:
-    """Shade every fragment, and copy the colours to the window's buffer.
+    """Clear the colours, shade every fragment, and copy the colours to the window's buffer.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def fragment_shading(
     -------
     outputs : ndarray, (H, W, 3), uint8
         The picture.
-    works : the shading kernel and the copy
+    works : the clear, the shading kernel and the copy
     """
     height, width = visible.triangles.shape
     image = np.zeros((height, width, 3), np.uint8)
@@ -198,6 +199,7 @@ def fragment_shading(
     drawn = visible.triangles >= 0
     textures = np.where(drawn, mesh.texture_ids[visible.triangles], np.int32(-1))
     works = (
+        memset("colors", 3 * pixels, simt),
         shading_work(drawn, textures, fragments.uvs, chains, texture_filter, simt),
         thread_per_item("copy", "copy", pixels, BLOCK, simt, (colors,), window),
     )

@@ -93,7 +93,13 @@ def shading_work(
     fragments, pixels = int(drawn.sum()), drawn.size
     texture_bytes = 32 * texels * int(table[:, event.TEXTURED_LANES].sum())
     streams = (
-        Stream("fragments", "load", 32 * (pixels + fragments), min(32 * (pixels + fragments), FRAGMENT_BYTES * pixels)),
+        Stream(
+            "fragments",
+            "load",
+            32 * (pixels + fragments),
+            min(32 * (pixels + fragments), FRAGMENT_BYTES * pixels),
+            pair_bytes=FRAGMENT_BYTES * pixels,
+        ),
         Stream("texture", "load", texture_bytes, min(texture_bytes, footprint * LINE_BYTES)),
         Stream("colors", "store", 12 * fragments, 12 * fragments),
     )

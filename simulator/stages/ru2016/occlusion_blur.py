@@ -18,6 +18,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from tilestamp.simulator.work import Work
 
 SIDE = 8  # pixels that a block blurs
@@ -26,7 +27,6 @@ WINDOW = 4  # pixels on a side, the noise's period
 THREADS = SIDE + 2 * HALO  # on a side
 BLOCK = THREADS * THREADS
 SHARED_BYTES = 4 * BLOCK
-RECORD_BYTES = 64  # fragment with its occlusion
 SECTOR_BYTES = 32
 
 
@@ -77,7 +77,7 @@ def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> StageResult[NDArra
     table = np.tile(_block(light.shape[1], simt), (blocks, 1))
     loaded, stored, footprint = BLOCK * blocks, SIDE * SIDE * blocks, SECTOR_BYTES * light.size
     streams = (
-        Stream("occlusion", "load", SECTOR_BYTES * loaded, footprint),
+        Stream("fragments", "load", SECTOR_BYTES * loaded, footprint, pair_bytes=FRAGMENT_BYTES * light.size),
         Stream("fragments", "store", SECTOR_BYTES * stored, footprint),
     )
     work = Work(
@@ -102,7 +102,7 @@ def _block(width: int, simt: Simt) -> NDArray[np.int64]:
         thread = np.arange(first, first + simt.warp)
         y, x = thread // THREADS, thread % THREADS
         inner = (y >= HALO) & (y < HALO + SIDE) & (x >= HALO) & (x < HALO + SIDE)
-        address = (y * width + x) * RECORD_BYTES
+        address = (y * width + x) * FRAGMENT_BYTES
         row[event.WARPS] += 1
         row[event.BLUR_WARPS] += inner.any()
         for active, name in ((thread < BLOCK, "LOAD"), (inner, "STORE")):

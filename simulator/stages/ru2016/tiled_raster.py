@@ -164,6 +164,7 @@ def tiled_raster(
     simt: Simt,
     *,
     tile: int,
+    gaps: bool = True,
 ) -> StageResult[Visible]:
     """Find the nearest triangle of each pixel.
 
@@ -175,6 +176,8 @@ def tiled_raster(
     width, height, tile : int
         Pixels.
     simt : Simt
+    gaps : bool
+        Whether fragments leave the padding at their end as it was; with ambient occlusion they have none.
 
     Returns
     -------
@@ -199,6 +202,7 @@ def tiled_raster(
             width * height * (FRAGMENT_BYTES + 4),
             span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
             partial_lines=_lines(simt, tile) * int(events[:, TiledRasterEvent.WARPS].sum()),
+            gaps=gaps,
         ),
     )
     return StageResult(visible, (raster_work(events, tile, streams),))
