@@ -3,9 +3,9 @@
 Without a cache every byte of every transaction goes to DRAM. With an L2, a launch fetches the part of each buffer's
 footprint that no earlier launch of the frame left there; bytes beyond the footprint are read again and miss only by
 the share in which all footprints of the launch together (or the span that a stream names) exceed the cache. Stores
-stay in the cache until something pushes them out (write-back), and the launch that does so pays (``models.cache``), more
-for lines that were stored with gaps (``models.gap_lines``).
-A frame's launches hand whole buffers to each other, so buffers and not lines are what is reused.
+stay in the cache until something pushes them out (write-back), and the launch that does so pays (``models.cache``),
+more for lines that were stored with gaps (``models.gap_lines``). A frame's launches hand whole buffers to each other,
+so buffers and not lines are what is reused.
 
 Where L1 keeps what its SM loaded (compute capability 7.0 on), units that ask for the same segment find it there only
 if the other ran on the same SM. With S of them and units dealt at random, a segment that k units ask for comes from L2
@@ -144,7 +144,9 @@ def _launch_traffic(requested: tuple[Stream, ...], caches: Caches, cache: Cache,
     written = _footprints((stream for stream in streams if stream.op != "load"), caches.fetch_bytes)
     working_set = sum(footprints.values())
     found, dram = cache.run(footprints, written)
-    filled = gaps.run(working_set - sum(found.values()), sum(written[stream.buffer] for stream in streams if stream.gaps))
+    filled = gaps.run(
+        working_set - sum(found.values()), sum(written[stream.buffer] for stream in streams if stream.gaps)
+    )
     dram += filled * caches.fetch_bytes
     loaded = missed = 0.0
     for stream in streams:
