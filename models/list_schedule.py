@@ -67,7 +67,7 @@ def list_schedule(
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
     drawn = moved = end = last_start = 0.0
-    interval, start, slower = pace
+    interval, start, slower = pace.interval, pace.start, pace.slower if waits else 1.0
     begun, busy = -interval, moves.sum() if len(moves) > 0 else 0.0
     for i in range(units):
         begun += interval
