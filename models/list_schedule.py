@@ -37,7 +37,7 @@ class Pace(NamedTuple):
     start : float
         From a free place to the first instruction of the unit put there.
     slower : float
-        Times that a unit's own time is longer while memory is busy; 1: it is not.
+        Times that a unit's own time is longer while memory is busy and units wait for a place; 1: it is not.
     """
 
     interval: float
@@ -58,7 +58,7 @@ def list_schedule(
     """End of all units; the start of the one that ends last; each unit's in ``record``, if that has room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
-    taken does not start at once later. Until memory has served all, units go on as slowly as ``pace`` says.
+    taken does not start at once later. While more wait and memory is busy, units go on as slowly as ``pace`` says.
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
     there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
