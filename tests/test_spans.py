@@ -24,7 +24,7 @@ ROUNDING = 1e-6
 def naive(units, alone, places):
     """Start and end of each unit: heaps of places and SMs, the soonest taken each time."""
     free, served, drawn, moved, found, begun = [0.0] * places, [0.0] * units.sms, 0.0, 0.0, [], -units.pace.interval
-    slower, busy = units.pace.slower, sum(units.moves)
+    slower, busy = units.pace.slower, sum(units.moves) if len(units.sm) > places else 0.0
     for i, sm in enumerate(units.sm):
         begun = max(free[0], begun + units.pace.interval)
         done = max(served[0], begun + units.pace.start) + sm

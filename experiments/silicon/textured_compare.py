@@ -44,9 +44,14 @@ class Drawn:
     counted_as: tuple[str, ...] = ()
 
     @property
+    def launched(self) -> list[tuple[str, Launch | PipeLaunch]]:
+        """Launches that the author's frame has too, each with his name of it."""
+        return [(kernel, launch) for kernel, launch in zip(self.kernels, self.run.launches, strict=True) if kernel]
+
+    @property
     def timings(self) -> list[Timing]:
-        """Time of each launch in a frame that follows another one, as they were measured."""
-        launches = self.run.launches
+        """Time of each of them in a frame that follows another one, as they were measured."""
+        launches = [launch for _, launch in self.launched]
         return price([*launches, *launches], self.run.machine)[len(launches) :]
 
 
@@ -54,7 +59,7 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
     """Ours beside what was measured of each launch: time, and counters where it was profiled."""
     seen: Counter[str] = Counter()
     timings = drawn.timings
-    for kernel, launch, ours in zip(drawn.kernels, drawn.run.launches, timings, strict=True):
+    for (kernel, launch), ours in zip(drawn.launched, timings, strict=True):
         instance = seen[kernel]
         seen[kernel] += 1
         about = {"scene": measured.name, "config": drawn.config, "kernel": kernel, "instance": instance}
@@ -71,7 +76,7 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
             yield from (about | counted for counted in _counters(launch, counters, drawn))
     about = {"scene": measured.name, "config": drawn.config, "kernel": "frame", "instance": 0}
-    whole = 1e3 * sum(each.milliseconds for each, kernel in zip(timings, drawn.kernels, strict=True) if kernel)
+    whole = 1e3 * sum(each.milliseconds for each in timings)
     yield about | entry(FRAME_TIME, whole, measured.on_gpu[drawn.config, "frame", 0, FRAME_METRIC], None)
 
 

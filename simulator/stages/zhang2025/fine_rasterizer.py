@@ -30,7 +30,7 @@ from tilestamp.simulator.work import Work
 
 TILES_A_BLOCK = 4  # after optimization
 FRAGMENT_BYTES = 48
-FRAGMENT_STORES = 4  # of 16, 16, 8 and 4 bytes, a sector each
+FRAGMENT_STORES = 4  # of 16, 16, 8 and 4 bytes, a sector each; 4 bytes of a fragment stay as they were
 EDGE_WORDS, DEPTH_WORDS, QUAD_WORDS = 9, 3, 22  # that are loaded of a primitive: for coverage, at each pixel, for quads
 FRAGMENT_OUT = 84  # bytes of a fragment that leave L1 for its four stores of 44 bytes in all: measured on an H200
 
@@ -118,7 +118,7 @@ def fine_rasterizer(
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),
         Stream("setup", "load", 160 * int(total[FineRasterizerEvent.ROUND_LANES]), drawn * SETUP_BYTES),
         Stream("depth", "load", 4 * pixels, 4 * pixels),
-        Stream("fragments", "store", FRAGMENT_OUT * quads, FRAGMENT_BYTES * quads, 4 * FRAGMENT_BYTES),
+        Stream("fragments", "store", FRAGMENT_OUT * quads, FRAGMENT_BYTES * quads, 4 * FRAGMENT_BYTES, gaps=True),
         Stream("depth", "store", 4 * pixels, 4 * pixels),
     )
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
