@@ -54,8 +54,10 @@ def record_of(units: int) -> Record:
 @kernel
 def list_schedule(
     sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace, record: Record
-) -> tuple[float, float]:
-    """End of all units; the start of the one that ends last; each unit's in ``record``, if that has room.
+) -> tuple[float, float, float]:
+    """End of all units; the start of the one that ends last; how long all hold their places; each unit in ``record``.
+
+    ``record`` may have no room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
     taken does not start at once later. Until memory has served all, units go on as slowly as ``pace`` says.
@@ -66,7 +68,7 @@ def list_schedule(
     waits, shares = units > places, places > sms < units
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
-    drawn = moved = end = last_start = 0.0
+    drawn = moved = end = last_start = held = 0.0
     interval, start, slower = pace
     begun, busy = -interval, moves.sum() if len(moves) > 0 else 0.0
     for i in range(units):
@@ -87,11 +89,12 @@ def list_schedule(
         done = max(done, begin + alone[i] + waited)
         if len(record.start) > 0:
             record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
+        held += done - begun
         if done > end:
             end, last_start = done, begun
         if waits:
             replay(free, free_who, done)
-    return end, last_start
+    return end, last_start, held
 
 
 @kernel

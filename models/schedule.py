@@ -106,7 +106,7 @@ class Played(NamedTuple):
     served : float
         What an SM serves in all, in the mean.
     held : float
-        What all units together take, with their neighbours in the way.
+        What all units together hold their places.
     """
 
     low: float
@@ -176,19 +176,20 @@ def play(units: Loads) -> Played:
         served += units.sm[i]
     mean, served = own / max(1, len(units.sm)), served / units.sms
     crowded, more = crowd(units)
-    end, started = ends(units, crowded, units.places, record_of(0))
+    end, started, held = ends(units, crowded, units.places, record_of(0))
     waited = end * more / (own + more) if more else 0.0
     if more and own / units.sms < end + waited:
-        lonely, lonely_started = ends(units, units.alone, units.sms, record_of(0))
-        started = lonely_started if lonely < end else started
+        lonely, lonely_started, lonely_held = ends(units, units.alone, units.sms, record_of(0))
+        if lonely < end:
+            started, held = lonely_started, lonely_held
         return Played(
-            min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, own
+            min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, held
         )
-    return Played(end - waited, end, end + waited, started, mean, served, own + more)
+    return Played(end - waited, end, end + waited, started, mean, served, held)
 
 
 @kernel
-def ends(units: Loads, alone: Any, places: int, record: Record) -> tuple[float, float]:
+def ends(units: Loads, alone: Any, places: int, record: Record) -> tuple[float, float, float]:
     """``list_schedule`` of what the units load the machine with."""
     loads = units.sm, alone, units.draws, units.moves
     return list_schedule(*loads, places, units.sms, units.pace, record)  # type: ignore[no-any-return]

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 FRAME_TIME = "frame time"  # sum of the kernels and memsets
 SPAN = "frame from start to end"
+OCCUPANCY = "achieved occupancy"
+OCCUPANCY_METRIC = "sm__warps_active.avg.pct_of_peak_sustained_active"  # of the cycles in which an SM holds any warp
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,9 @@ def rows(measured: Measured, drawn: Drawn) -> Iterator[dict[str, Any]]:
             )
         for config in (drawn.config, *drawn.counted_as):
             place = (config, kernel, instance)
+            if (*place, OCCUPANCY_METRIC) in measured.on_gpu:
+                held = measured.on_gpu[*place, OCCUPANCY_METRIC] / 100.0
+                yield about | entry(OCCUPANCY, ours.achieved, held, None, absolute=True)
             counters = {key[3]: value for key, value in measured.on_gpu.items() if key[:3] == place}
             yield from (about | counted for counted in _counters(launch, counters, drawn))
     about = {"scene": measured.name, "config": drawn.config, "kernel": "frame", "instance": 0}
