@@ -110,6 +110,7 @@ def test_fragments_beyond_the_kept_ones_are_counted(scene, matrix):
     kept = work(few, "ROP").counts()
     assert kept["LOST"] + kept["BLEND_LANES"] == work(every, "ROP").counts()["BLEND_LANES"]
     assert kept["LOST"] > 0
+    assert [any("illegal memory access" in said for said in each.warnings) for each in (few, every)] == [True, False]
 
 
 def test_clipping_changes_nothing_inside(matrix):

@@ -22,9 +22,10 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.ru2016.compiled import words
 from tilestamp.simulator.stages.ru2016.per_primitive_walk import DEPTH_SCALE, FAR, walk
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent, walkers
-from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, THREADS_AN_SM
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES
 from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES, Visible
 from tilestamp.simulator.stages.ru2016.vertex_shading import SHIFTS, Samples
 from tilestamp.simulator.work import Work
@@ -94,7 +95,7 @@ def per_primitive_raster(
     blocks = max(1, -(-len(drawable) // BLOCK))
     events = np.zeros((blocks, len(PerPrimitiveEvent)), np.int64)
     requests = np.zeros(width * height // 8 + 1, np.int64)
-    resident = simt.sms * (THREADS_AN_SM // simt.warp)
+    resident = simt.sms * (words(simt).raster_threads // simt.warp)
     walk(
         (screen, triangles, drawable, SHIFTS[samples], mapped),
         culling,
@@ -115,7 +116,7 @@ def per_primitive_raster(
             "store",
             SECTOR_BYTES * stored,
             FRAGMENT_BYTES * width * height,
-            span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
+            span_bytes=simt.sms * words(simt).raster_threads * FRAGMENT_BYTES,
         ),
     )
     work = Work(

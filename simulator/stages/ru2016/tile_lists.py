@@ -18,6 +18,7 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.ru2016.compiled import words
 from tilestamp.simulator.stages.ru2016.tile_lists_fill import fill
 from tilestamp.simulator.stages.ru2016.tile_lists_warps import BLOCK, TileListEvent, walkers
 from tilestamp.simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
@@ -27,7 +28,6 @@ from tilestamp.simulator.work import Work
 SCAN_BLOCK = 256  # threads (ours: the original has no scan)
 SMALL_MODEL = 100  # triangles up to which a list can hold all of them
 COORDINATES = 6  # words read of each primitive: x and y of its corners
-THREADS_AN_SM = 1024  # resident: 50 % of 2048, as 63 registers allow
 SECTOR_BYTES = 32  # loads of compute capability 3.0 pass by L1 and move such sectors
 Capacity = Literal["safe", "original"]
 
@@ -87,7 +87,7 @@ def tile_lists(
         (screen, triangles, drawable),
         (width, height, tile, culling),
         (int(simt.coalescing), int(simt.atomic_merge)),
-        walkers(min(simt.sms * THREADS_AN_SM, len(drawable) + BLOCK) // simt.warp, simt.warp),
+        walkers(min(simt.sms * words(simt).list_threads, len(drawable) + BLOCK) // simt.warp, simt.warp),
     )
 
     room = 0  # where lists have a fixed room, they lie that far apart; only the entries that fit are kept here

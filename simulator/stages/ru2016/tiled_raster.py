@@ -23,7 +23,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.compiled import words
-from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, THREADS_AN_SM, TileLists
+from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
@@ -200,7 +200,7 @@ def tiled_raster(
             "store",
             width * height * (len(words(simt).fragment) * SECTOR_BYTES + 4),
             width * height * (FRAGMENT_BYTES + 4),
-            span_bytes=simt.sms * THREADS_AN_SM * FRAGMENT_BYTES,
+            span_bytes=simt.sms * words(simt).raster_threads * FRAGMENT_BYTES,
             partial_lines=_lines(simt, tile) * int(events[:, TiledRasterEvent.WARPS].sum()),
             gaps=gaps,
         ),
