@@ -31,8 +31,8 @@ from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex
 REMARKS = {
     "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
     "fragments lost beyond the kept ones": (
-        "{:,} fragments beyond those that a pixel can keep are lost; the original, which keeps 4, writes past its shared "
-        "memory there and stops (illegal memory access on an H200)"
+        "{:,} fragments beyond those that a pixel can keep are lost; the original, which keeps 4, writes past its "
+        "shared memory there and stops (illegal memory access on an H200)"
     ),
     "fragments beyond the stream's room": "{:,} fragments find no room in the original's stream",
 }
