@@ -3,9 +3,9 @@
 One thread a pixel, 16x16 a block. Each walks its pixel's list (the newest fragment first) and keeps the covered
 fragments, sorts them by primitive identifier (API order) or by depth (order-independent transparency), and tests and
 blends them. The original keeps four in shared memory and does not check for more: it writes past the end, and an H200
-stops it ("illegal memory access"). Here the first four found are kept and the rest is reported, and 0 asks for no limit. Before optimization the four lay in local memory. A list ends with
-number -1 here; in the original with 0, which is also the number of the frame's first fragment: it is never drawn
-(``zero_ends``).
+stops it ("illegal memory access"). Here the first four found are kept and the rest is reported, and 0 asks for no
+limit. Before optimization the four lay in local memory. A list ends with number -1 here; in the original with 0, which
+is also the number of the frame's first fragment: it is never drawn (``zero_ends``).
 """
 
 from typing import Any, Literal, NamedTuple
