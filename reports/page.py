@@ -1,19 +1,24 @@
 """The page that a visitor reads: made of what lies in a folder of results, in one HTML file that needs no network.
 
-The folder has ``scoreboard.json`` and, in a folder for each result, ``result.json``. The first screen shows the result that
-has the figures ``picture`` and ``heat-map``. Charts are drawn by Vega, whose scripts are in the page once; a static
-picture of each, in ``page/``, stands in its place on paper and without scripts.
+The folder has ``scoreboard.json`` and, in a folder for each result, ``result.json``. The first screen shows the result
+that has the figures ``picture`` and ``heat-map``. Charts are drawn by Vega, whose scripts are in the page once; a
+static picture of each, in ``page/``, stands in its place without scripts.
 """
 
 import csv
 import json
 import tomllib
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tilestamp.reports.page_charts import chart_of, scatter_of
+from tilestamp.reports.chart_kinds import table_chart
+from tilestamp.reports.chart_scatter import scatter_chart
 from tilestamp.reports.page_words import Glossary, error, number, percent
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
 TITLE = "tilestamp: papers beside the model"
@@ -40,7 +45,7 @@ def write_page(folder: Path) -> Path:
 
     scoreboard = json.loads((folder / "scoreboard.json").read_text(encoding="utf-8"))
     sections = [_section(folder, row) for row in scoreboard["rows"] if (folder / row["name"] / "result.json").is_file()]
-    scatter = scatter_of(sections, folder)
+    scatter = scatter_chart(sections, folder)
     charts = [chart for chart in (scatter, *(one for section in sections for one in section["charts"])) if chart]
     glossary = Glossary.read(TEMPLATES / "glossary.toml")
     environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -63,18 +68,19 @@ def write_page(folder: Path) -> Path:
     return path
 
 
-def _library() -> Any:
+@cache
+def _library() -> "Markup":
     """Vega, Vega-Lite and their embedding, as one script."""
     from markupsafe import Markup
     from vl_convert import javascript_bundle
 
-    return Markup(javascript_bundle().replace("</script", "<\\/script"))  # noqa: S704 - a library of ours to trust
+    return Markup(javascript_bundle("window.vegaEmbed = vegaEmbed;").replace("</script", "<\\/script"))  # noqa: S704 - a library of ours to trust
 
 
 def _section(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
     """One result for the templates."""
     own = folder / row["name"]
-    section = json.loads((own / "result.json").read_text(encoding="utf-8"))
+    section: dict[str, Any] = json.loads((own / "result.json").read_text(encoding="utf-8"))
     compared = any(cell["published"] is not None for cell in section["cells"])
     files = ["cells.csv", *section["tables"], "manifest.json"]
     return section | {
@@ -84,7 +90,7 @@ def _section(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
         "columns": COMPARED if compared else ALONE,
         "files": [file for file in files if (own / file).is_file()],
         "figures": [_figure(own, figure) for figure in section["figures"]],
-        "charts": [chart_of(chart, section["name"], folder) for chart in section["charts"]],
+        "charts": [table_chart(chart, section["name"], folder) for chart in section["charts"]],
     }
 
 

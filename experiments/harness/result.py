@@ -113,7 +113,8 @@ class Chart:
     name, title, alt : str
         ``alt`` says what it shows to who cannot see it.
     kind : {"front", "lines", "sliders", "tiles"}
-        Cost against error, lines by colour, bars of the row that sliders point at, a map (``tilestamp.reports.charts``).
+        Cost against error, lines by colour, bars of the row that sliders point at, or a map
+        (``tilestamp.reports.chart_kinds``).
     table : str
         One of the result's tables.
     of : dict

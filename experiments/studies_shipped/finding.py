@@ -32,8 +32,8 @@ def finding(
 ) -> Result:
     """Make the result of a shipped study."""
     return Result(
-        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), figures=list(figures),
-        charts=list(charts),
+        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), answer=notes[0],
+        figures=list(figures), charts=list(charts),
         notes=list(notes), warnings=list(warnings), tables=dict(tables),
     )  # fmt: skip
 

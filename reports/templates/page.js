@@ -5,11 +5,7 @@ for (const view of document.querySelectorAll("[data-spec]")) {
   if (spec.usermeta && spec.usermeta.ratio) spec.height = Math.round(view.clientWidth * spec.usermeta.ratio);
   const still = view.querySelector("img");
   const options = { renderer: "svg", actions: false, loader: { target: "_self" }, ast: false };
-  vegaEmbed(view, spec, options).then(() => {
-    view.classList.add("live");
-    /* hundreds of points are no stops for the keyboard: the tables have the same links */
-    for (const link of view.querySelectorAll("svg a")) link.setAttribute("tabindex", "-1");
-  }, () => view.replaceChildren(still));
+  vegaEmbed(view, spec, options).then(() => view.classList.add("live"), () => view.replaceChildren(still));
 }
 
 /* What a link points into is opened. */
