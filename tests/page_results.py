@@ -30,8 +30,8 @@ def paper() -> Result:
     cells += [Cell("a <b>", "order", "", published="4x4 < 8x8", ours="8x8 < 4x4")]
     return Result(
         name="eisenacher2010-table9", experiment="eisenacher2010/table9", title="Table 9: times & counts",
-        source="A paper", cells=cells, answer="The STE is 20 %.", figures=[Figure("plot", _plot)], notes=["At 4 spp, 1 < 2."],
-        warnings=["STAND-IN for a model"], tables={"more": pd.DataFrame({"a": [1]})},
+        source="A paper", cells=cells, answer="The STE is 20 %.", figures=[Figure("plot", _plot)],
+        notes=["At 4 spp, 1 < 2."], warnings=["STAND-IN for a model"], tables={"more": pd.DataFrame({"a": [1]})},
     )  # fmt: skip
 
 
