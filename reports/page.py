@@ -1,86 +1,66 @@
-"""The page that a visitor reads: every result with its table, plots and notes, in one HTML file."""
+"""The page that a visitor reads: made of what lies in a folder of results, in one HTML file that needs no network.
 
-import json
-from pathlib import Path
-from typing import Any
-
-INTRODUCTION = (
-    "Published cells beside what tilestamp computes. How fitted a cell is, is computed: each number that was "
-    "fitted on its frame is changed by 1 %, and share is the part of that change that the cell follows. Predicted: "
-    "at most 10 %; fitted: at least 90 %, or a number was chosen on this very cell: its error says nothing; "
-    "stand-in: of another model than the paper's, which is not here; "
-    "reproduced: published by a computation like ours, not measured. Only errors of predicted cells speak of the "
-    "model. Red: outside the aim."
-)
-TEMPLATE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width"><title>{{ title }}</title>
-<style>
- body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
- h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; border-top: 1px solid #ddd; padding-top: 1.2rem; }
- table { border-collapse: collapse; font-size: 13px; margin: .8rem 0; display: block; overflow-x: auto; }
- td, th { padding: .15rem .6rem; text-align: right; }
- th { border-bottom: 1px solid #999; }
- td:first-child, th:first-child, td:nth-child(2), th:nth-child(2) { text-align: left; }
- tr.fitted td { color: #888; font-style: italic; }
- td:nth-child(n+3):nth-child(-n+9) { white-space: nowrap; }
- td:nth-child(10), th:nth-child(10) { text-align: left; } td:nth-child(10) { font-size: 11px; min-width: 14rem; }
- tr.missed td.error { color: #b00020; font-weight: 600; }
- nav ul { margin: .2rem 0 .8rem; padding-left: 1.2rem; } nav p { margin: .2rem 0; } a { color: #1f5aa6; }
- img { max-width: 100%; } .note { color: #555; } .standin { background: #fff4d6; padding: .4rem .8rem; }
- table.overview td, table.overview th { text-align: left; vertical-align: top; border-bottom: 1px solid #eee; }
- table.overview td { white-space: normal; min-width: 4rem; }
- footer { color: #777; font-size: 12px; margin-top: 3rem; }
-</style></head><body>
-<h1>{{ title }}</h1>
-<p>{{ introduction }}</p>
-<nav>{% for group in results | groupby("group") %}<p><b>{{ group.list[0].about }}</b></p><ul>
-{% for result in group.list %}
-<li><a href="#{{ result.name }}">{{ result.title }}</a></li>{% endfor %}</ul>{% endfor %}</nav>
-{% for result in results %}
-<h2 id="{{ result.name }}">{{ result.title }}</h2>
-<p><b>{{ result.question }}</b> {{ result.answer }}</p>
-<p class="note">{{ result.source }}</p>
-{% for note in result.warnings %}<p class="standin">{{ note }}</p>{% endfor %}
-{% if result.rows %}<table><tr>{% for column in result.columns %}<th>{{ column }}</th>{% endfor %}</tr>
-{% for row in result.rows %}<tr class="{{ row.marks }}">{% for value in row.cells %}
-<td{% if loop.index0 == result.error_column %} class="error"{% endif %}>{{ value }}</td>{% endfor %}</tr>
-{% endfor %}</table>{% endif %}
-{% for sentence in result.averages %}<p><b>{{ sentence }}</b></p>
-{% endfor %}
-{% for figure in result.figures %}<p><img src="{{ figure }}" alt="{{ figure }}"></p>{% endfor %}
-{% for note in result.fitted + result.notes %}<p>{{ note }}</p>{% endfor %}
-{% endfor %}
-<footer>{{ footer }}</footer>
-</body></html>
+The folder has ``scoreboard.json`` and, in a folder for each result, ``result.json``. The first screen shows the result
+that has the figures ``picture`` and ``heat-map``. Charts are drawn by Vega, whose scripts are in the page once; a
+static picture of each, in ``page/``, stands in its place without scripts.
 """
 
+import csv
+import json
+import tomllib
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim", "share", "fitted by")
+from tilestamp.reports.chart_kinds import table_chart
+from tilestamp.reports.chart_scatter import scatter_chart
+from tilestamp.reports.page_words import Glossary, error, number, percent
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+TEMPLATES = Path(__file__).parent / "templates"
+TITLE = "tilestamp: papers beside the model"
+FIRST_SCREEN = ("picture", "heat-map")  # figures
+COMPARED = ("row", "column", "unit", "published", "ours", "error", "status", "aim", "share", "fitted by")
+ALONE = ("row", "column", "ours", "unit")
+BOUNDARIES = ("method", "parameter", "holds", "breaks", "unit", "wrong", "cure", "cost")
 
 
 def write_page(folder: Path) -> Path:
-    """Render the page over the results that lie in a folder.
+    """Write the page over all results of a folder.
 
     Parameters
     ----------
     folder : Path
-        With ``scoreboard.json`` and a folder for each result, each with ``result.json``.
+        Where results lie; ``index.html`` and ``page/`` are written into it.
 
     Returns
     -------
     Path
-        The page, ``index.html``.
+        The page.
     """
-    from jinja2 import Environment
+    from jinja2 import Environment, FileSystemLoader
 
-    scoreboard = json.loads((folder / "scoreboard.json").read_text("utf-8"))
-    results = [json.loads((folder / row["name"] / "result.json").read_text("utf-8")) for row in scoreboard["rows"]]
-    footer = f"tilestamp {scoreboard['tilestamp']}, sources {scoreboard['source_digest']}"
-    title = "tilestamp: papers beside the model"
-    page = Environment(autoescape=True).from_string(TEMPLATE)
-    sections = [_section(result) for result in results]
-    text = page.render(title=title, introduction=INTRODUCTION, results=sections, footer=footer)
+    scoreboard = json.loads((folder / "scoreboard.json").read_text(encoding="utf-8"))
+    sections = [_section(folder, row) for row in scoreboard["rows"] if (folder / row["name"] / "result.json").is_file()]
+    scatter = scatter_chart(sections, folder)
+    charts = [chart for chart in (scatter, *(one for section in sections for one in section["charts"])) if chart]
+    glossary = Glossary.read(TEMPLATES / "glossary.toml")
+    environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"terms": glossary.marked, "number": number, "percent": percent, "error": error}
+    text = environment.get_template("page.html.j2").render(
+        title=TITLE,
+        scoreboard=scoreboard,
+        doors=_doors(sections),
+        pictures=[_first_screen(section) for section in sections if _first_screen(section)][:1],
+        scatter=scatter,
+        charts=charts,
+        library=_library() if charts else "",
+        glossary=glossary.terms,
+        footer=f"tilestamp {scoreboard['tilestamp']}, sources {scoreboard['source_digest']}, {scoreboard['date']}",
+    )
     path = folder / "index.html"
     partial = path.with_suffix(".partial")
     partial.write_text(text, encoding="utf-8")
@@ -88,30 +68,86 @@ def write_page(folder: Path) -> Path:
     return path
 
 
-def _section(result: dict[str, Any]) -> dict[str, Any]:
-    """One result for the template."""
-    name = result["name"]
-    rows = [{"cells": _texts(cell), "marks": _marks(cell)} for cell in result["cells"]]
-    figures = [f"{name}/{figure['file']}" for figure in result["figures"]]
-    return result | {"rows": rows, "figures": figures, "columns": COLUMNS, "error_column": COLUMNS.index("error")}
+@cache
+def _library() -> "Markup":
+    """Vega, Vega-Lite and their embedding, as one script."""
+    from markupsafe import Markup
+    from vl_convert import javascript_bundle
+
+    return Markup(javascript_bundle("window.vegaEmbed = vegaEmbed;").replace("</script", "<\\/script"))  # noqa: S704 - a library of ours to trust
 
 
-def _marks(cell: dict[str, Any]) -> str:
-    return f"{cell['status'].split()[-1]}{' missed' if cell['missed'] else ''}"
+def _section(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
+    """One result for the templates."""
+    own = folder / row["name"]
+    section: dict[str, Any] = json.loads((own / "result.json").read_text(encoding="utf-8"))
+    compared = any(cell["published"] is not None for cell in section["cells"])
+    files = ["cells.csv", *section["tables"], "manifest.json"]
+    return section | {
+        "boundaries": _boundaries(own / "boundaries.csv"),
+        "seconds": row.get("seconds"),
+        "compared": compared,
+        "columns": COMPARED if compared else ALONE,
+        "files": [file for file in files if (own / file).is_file()],
+        "figures": [_figure(own, figure) for figure in section["figures"]],
+        "charts": [table_chart(chart, section["name"], folder) for chart in section["charts"]],
+    }
 
 
-def _texts(cell: dict[str, Any]) -> list[str]:
-    fitted_by = "; ".join(f"{name} {100 * part:.0f} %" for name, part in cell["fitted_by"])
-    error = "" if cell["error"] is None else f"{100 * cell['error']:+.1f} %"
-    numbers = [_number(cell["published"]), _number(cell["ours"])]
-    if cell["kind"] == "order":
-        error = "as published" if cell["published"] == cell["ours"] else "differs" if cell["published"] else ""
-    aim = "" if cell["aim"] is None else f"{100 * cell['aim']:.0f} %"
-    share = f"{100 * cell['share']:.0f} %" if cell["status"] in {"predicted", "partly fitted", "fitted"} else ""
-    return [cell["row"], cell["column"], cell["unit"], *numbers, error, cell["status"], aim, share, fitted_by]
+def _boundaries(path: Path) -> list[dict[str, str]]:
+    """The rows of the stability atlas that a result has."""
+    return list(csv.DictReader(path.open(encoding="utf-8", newline=""))) if path.is_file() else []
 
 
-def _number(value: float | str | None) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+def _figure(own: Path, figure: dict[str, Any]) -> dict[str, Any]:
+    """A plot with its size on paper and its place beside the page."""
+    from PIL import Image
+
+    with Image.open(own / figure["file"]) as picture:
+        width, height = picture.size
+    vector = figure.get("vector")
+    return figure | {
+        "file": f"{own.name}/{figure['file']}",
+        "vector": f"{own.name}/{vector}" if vector else None,
+        "width": width,
+        "height": height,
+    }
+
+
+def _first_screen(section: dict[str, Any]) -> dict[str, Any] | None:
+    """The picture and its heat map, where a result has both."""
+    named = {figure["name"]: figure for figure in section["figures"]}
+    if not named.keys() >= set(FIRST_SCREEN):
+        return None
+    pictures = [named[name] for name in FIRST_SCREEN]
+    return {"name": section["name"], "caption": section["answer"], "pictures": pictures}
+
+
+def _doors(sections: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Doors behind which there is something, each with its sections and the tables over several of them."""
+    doors = tomllib.loads((TEMPLATES / "doors.toml").read_text(encoding="utf-8"))["door"]
+    known = {group for door in doors for group in door["groups"]}
+    for place, door in enumerate(doors):
+        own = [s for s in sections if s["group"] in door["groups"] or (place == 0 and s["group"] not in known)]
+        door |= {"sections": own, "groups": list(_groups(own))}
+    return [door for door in doors if door["sections"]]
+
+
+def _groups(sections: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Folders of experiments, each with its sections and a table of all their boundaries, where there are any."""
+    for name in dict.fromkeys(section["group"] for section in sections):
+        own = [section for section in sections if section["group"] == name]
+        rows = [
+            {"section": section["name"], "cells": [_end(row, column) for column in BOUNDARIES]}
+            for section in own
+            for row in section["boundaries"]
+        ]
+        overview = {"rows": rows, "columns": BOUNDARIES, "file": f"{name}.csv"}
+        yield {"about": own[0]["about"], "sections": own, "overview": overview if rows else None}
+
+
+def _end(row: dict[str, str], column: str) -> str:
+    """A text of the table of boundaries; of a value that holds, or one that breaks, four digits."""
+    if column not in {"holds", "breaks"}:
+        return row[column]
+    return number(float(row[column])) if row[column] else "none tried"

@@ -15,6 +15,7 @@ from tilestamp.experiments.studies_shipped import (
     gtx280_lacks,
     software_or_hardware,
     tile_size,
+    what_if,
 )
 from tilestamp.models.machine import altered, load_machine
 
@@ -39,6 +40,7 @@ SMALL = {
         "AREAS": {"middle": 32.0},
         "MOVES": {"sm.count": (0.5,), "pipe.fp32": (2.0,)},
     },
+    what_if: {"SIZE": (64, 48), "FACTORS": (1.0, 2.0)},
 }
 
 
@@ -59,6 +61,32 @@ def test_a_shipped_study_has_cells_sentences_and_pictures(small, tmp_path):
     for figure in result.figures:
         draw_figure(figure, result, tmp_path / f"{figure.name}.png")
         assert (tmp_path / f"{figure.name}.png").stat().st_size > 5000
+
+
+def test_a_chart_of_a_study_has_its_columns(small):
+    result = small.run(lambda _: None)
+    for chart in result.charts:
+        table = result.tables[chart.table]
+        columns = {chart.of[role] for role in ("x", "y", "color", "bar", "value") if role in chart.of}
+        assert columns | {*chart.of.get("pick", ()), *chart.of.get("sliders", ())} <= set(table.columns)
+
+
+def test_the_what_if_prices_the_frame_that_it_drew(monkeypatch):
+    monkeypatch.setattr(what_if, "FACTORS", (1.0, 2.0))
+    made = simulate("teapot", "micropolygon", "gtx280", width=64, height=48)
+    times = what_if.priced(made).groupby(list(what_if.NUMBERS))["milliseconds"].sum()
+    assert times[1.0, 1.0, 1.0] == pytest.approx(made.milliseconds, abs=1e-3)
+    faster = made.on(altered(made.machine, {"sm.clock_mhz": 2 * made.machine.sm.clock_mhz}))
+    assert what_if.twice(times)["clock"] == pytest.approx(faster.milliseconds, abs=1e-3)
+
+
+def test_the_what_if_counts_tiles_from_the_top():
+    made = simulate("teapot", "micropolygon", "gtx280", width=64, height=48)
+    table = what_if.tiles(made)
+    drawn = np.unique(np.nonzero((made.image != made.image[0, 0]).any(axis=-1))[0] // 8)
+    assert table["tests"].sum() == made.frame.maps["tests"].sum()
+    assert (table["y"].min(), table["y"].max()) == (drawn.min(), drawn.max())
+    assert drawn.min() != 48 // 8 - 1 - drawn.max()  # counted from below, it would be another row
 
 
 def test_all_of_them_are_named_at_once():

@@ -34,7 +34,7 @@ from tilestamp.experiments.frontier.model_frames import is_long
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.frontier.picture_error import depth_errors, pixel_errors
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.methods_plot import panels, side_by_side
 from tilestamp.simulator.reference.picture import SIDE
@@ -55,6 +55,15 @@ MEASURES = {
     "flip": ("FLIP (0: the converged picture)", "Error that an eye sees"),
     "wrong": ("share of wrong pixels", "Pixels of a wrong triangle or patch"),
 }
+CHARTS = [
+    Chart(
+        name=error, kind="front", table="methods", title=f"{title}, against modelled time; line: what nothing beats.",
+        alt=f"Scatter plot: {words} of each method over its modelled time, for a scene and a machine from lists.",
+        of={"x": "ms", "y": error, "color": "pipeline", "label": "method", "front": f"front_{error}",
+            "pick": {"scene": "Scene", "machine": "Machine"}, "titles": ["modelled time [ms]", words], "log_y": False},
+    )
+    for error, (words, title) in MEASURES.items()
+]  # fmt: skip
 WORST = 3  # pictures shown of those that are furthest off
 
 
@@ -93,6 +102,7 @@ def run(progress: Progress) -> Result:
         cells=_cells(table),
         answer=_answer(table),
         figures=_figures(table, worst),
+        charts=CHARTS,
         notes=notes(table, doubles),
         warnings=[],
         tables={"methods": table, "double-hits": doubles},

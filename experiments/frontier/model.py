@@ -14,7 +14,7 @@ from tilestamp.experiments.frontier.model_notes import BOUNDS, COUNTS, FULL, not
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
 from tilestamp.models.price import Fidelity
@@ -35,6 +35,12 @@ FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "counts":
 RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
 SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
 EXECUTED = "ours, all units executed"
+CHART = Chart(
+    name="methods", kind="front", table="methods", title="Seconds that an answer takes, against its error.",
+    alt="Scatter plot: mean error of a frame's time, against the full run, over CPU seconds.",
+    of={"x": "cpu_seconds", "y": "error_against_full", "color": "method", "label": "method",
+        "titles": ["time to simulate one frame [CPU s]", "mean error of the frame's time"]},
+)  # fmt: skip
 REPEATS = 2  # of pricing, which takes milliseconds
 
 
@@ -71,6 +77,7 @@ def run(progress: Progress) -> Result:
             Figure("against-full-run", lambda path: _draw_full(ours, count, path)),
             Figure("against-published", lambda path: _draw_published(ours, theirs, count, path)),
         ],
+        charts=[CHART],
         notes=notes(table, ours, theirs, _beside(ours, theirs)),
         warnings=warnings(),
         tables={"frames": table, "methods": ours, "detailed-simulators": theirs},

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.sampling_plot import sampling_plot
 from tilestamp.simulator.run import Run
@@ -84,6 +84,14 @@ def cases() -> list[Case]:
     return [*short, *patches, *scans, *meshes]
 
 
+CHART = Chart(
+    name="runs", kind="front", table="runs", title="What a sampled run saves, and how far its time is off.",
+    alt="Scatter plot: error of the frame's time over the share of a full run's CPU seconds; a colour a scene.",
+    of={"x": "share_of_full", "y": "milliseconds_error", "color": "scene", "label": "error_asked",
+        "titles": ["CPU seconds over those of the full run", "error of the frame's time"]},
+)  # fmt: skip
+
+
 def run(progress: Progress) -> Result:
     """Run every scene in full and with each error."""
     import pandas as pd
@@ -106,6 +114,7 @@ def run(progress: Progress) -> Result:
         cells=_cells(table),
         answer=_answer(table),
         figures=[Figure("seconds-against-error", lambda path: _draw(table, path))],
+        charts=[CHART],
         notes=_notes(table),
         warnings=warnings,
         tables={"runs": table},

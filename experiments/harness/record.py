@@ -46,6 +46,7 @@ def record_of(result: Result, folder: Path, stand_ins: list[str], seconds: float
         "averages": averages(result),
         "disagreements": disagreements(result),
         "figures": [_figure(figure.name, folder) for figure in result.figures],
+        "charts": [asdict(chart) | {"table": f"{chart.table}.csv"} for chart in result.charts],
         "tables": [f"{name}.csv" for name in result.tables],
         "scoreboard": asdict(row),
         "cells": cell_records(result),

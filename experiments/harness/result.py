@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import KW_ONLY, dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -105,6 +105,31 @@ class CellFigure:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Chart:
+    """A plot of one of a result's tables that a visitor of the page explores; drawn from the table as it is written.
+
+    Parameters
+    ----------
+    name, title, alt : str
+        ``alt`` says what it shows to who cannot see it.
+    kind : {"front", "lines", "sliders", "tiles"}
+        Cost against error, lines by colour, bars of the row that sliders point at, or a map
+        (``tilestamp.reports.chart_kinds``).
+    table : str
+        One of the result's tables.
+    of : dict
+        What the table's columns are: arguments of the function of that kind.
+    """
+
+    name: str
+    kind: Literal["front", "lines", "sliders", "tiles"]
+    table: str
+    title: str
+    alt: str
+    of: "dict[str, Any]"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Result:
     """What one experiment found.
 
@@ -134,6 +159,7 @@ class Result:
     cells: list[Cell]
     answer: str = ""
     figures: "Sequence[Figure | CellFigure]" = ()
+    charts: "Sequence[Chart]" = ()
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     tables: dict[str, "pd.DataFrame"] = field(default_factory=dict)

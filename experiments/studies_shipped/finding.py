@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
 from tilestamp.experiments.studies.study import Study
 
 if TYPE_CHECKING:
@@ -28,10 +28,12 @@ def finding(
     notes: Sequence[str],
     tables: Mapping[str, "pd.DataFrame"],
     warnings: Sequence[str] = (),
+    charts: Sequence[Chart] = (),
 ) -> Result:
     """Make the result of a shipped study."""
     return Result(
-        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), figures=list(figures),
+        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), answer=notes[0],
+        figures=list(figures), charts=list(charts),
         notes=list(notes), warnings=list(warnings), tables=dict(tables),
     )  # fmt: skip
 

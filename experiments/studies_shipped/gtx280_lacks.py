@@ -12,7 +12,7 @@ import numpy as np
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, MACHINE, frame, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Chart, Figure, Result
 from tilestamp.experiments.questions.best import Boundary, best_values, boundaries
 from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
 from tilestamp.models.errors import TilestampError
@@ -29,6 +29,13 @@ SLOW = True  # runs when it is named: tilestamp reproduce studies
 TILES = (4, 8, 16)
 FACTORS = tuple(2.0**power for power in range(-6, 7) if power)
 MOST_LINES = 7
+
+CHART = Chart(
+    name="scan", kind="lines", table="scan", title="Time of a frame by tile size, as the chosen number alone changes.",
+    alt="Lines: time of a frame over the factor of one number of the GTX 280, chosen from a list; a line a tile size.",
+    of={"x": "factor", "y": "milliseconds", "color": "tile", "pick": {"number": "Number"},
+        "titles": ["factor of the number", "time of a frame [ms]"]},
+)  # fmt: skip
 
 
 def run(progress: Progress) -> Result:
@@ -56,7 +63,7 @@ def run(progress: Progress) -> Result:
     title = "What the GTX 280 lacked: which number, changed alone, makes another tile the best, killeroo, 1600x1200"
     notes = [_usual(now, table["number"].nunique(), usual), *(_sentence(needed, usual, tile) for tile in others)]
     warnings = [WHAT_IF, *stand_in_warnings("killeroo")]
-    return finding("gtx280_lacks", title, cells, figures, notes, {"scan": table}, warnings)
+    return finding("gtx280_lacks", title, cells, figures, notes, {"scan": table}, warnings, [CHART])
 
 
 def machines() -> dict[tuple[str, float], Machine]:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Chart, Figure, Result
 from tilestamp.experiments.questions import answers
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
@@ -17,6 +17,13 @@ SLOW = True  # runs when it is named: tilestamp reproduce studies
 TILES, BOUNDS = [4, 8, 16], [2.0, 8.0]
 ZOOM = {"from": 0.5, "to": 8, "points": 4, "scale": "log"}
 FIXED = {"scene": "teapot", "size": "640x480", "bound_rule": "pixel_extent"}
+
+CHART = Chart(
+    name="zoom", kind="lines", table="grid", title="Time of a frame by tile size, on one machine.",
+    alt="Lines: time of a frame over zoom, a line for each tile size, for a machine and a bound chosen from lists.",
+    of={"x": "zoom", "y": "milliseconds", "color": "tile", "pick": {"machine": "Machine", "bound": "Bound [pixels]"},
+        "titles": ["zoom", "time of a frame [ms]"]},
+)  # fmt: skip
 
 
 def run(progress: Progress) -> Result:
@@ -32,7 +39,9 @@ def run(progress: Progress) -> Result:
     ]
     title = "Tile size against zoom and bound: the fastest tile of the micropolygon pipeline, teapot, 640x480"
     figures = [Figure("map", found.draw)]
-    return finding("tile_size", title, cells, figures, notes(best, table), {"cells": table, "best": best})
+    return finding(
+        "tile_size", title, cells, figures, notes(best, table), {"grid": table, "best": best}, charts=[CHART]
+    )
 
 
 def notes(best: "pd.DataFrame", table: "pd.DataFrame") -> list[str]:
