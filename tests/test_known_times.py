@@ -83,13 +83,6 @@ def test_a_block_holds_its_place_while_memory_serves_it():
     assert found[2] == 4.0 + 8.0
 
 
-def test_a_block_holds_its_place_while_memory_serves_it():
-    """Two places: blocks that would take 1 cycle each, served for 4 cycles one after another."""
-    ones, served = np.ones(2), np.array([4.0, 4.0])
-    found = list_schedule(np.zeros(2), ones, np.empty(0), served, 2, 2, Pace(0.0, 0.0, 1.0), record_of(0))
-    assert found[2] == 4.0 + 8.0
-
-
 def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
     """Describe blocks by event: one number for all, or one each."""
     table = np.zeros((units, EVENTS))
