@@ -30,13 +30,13 @@ WORD_BYTES = 4
 WARP_BYTES = 128  # consecutive words of 32 lanes
 
 
-@kernel
+@kernel(lent=True)
 def smallest_transaction_bytes(rule: int) -> int:
     """Bytes of the smallest transaction of a ``Coalescing`` rule: what a word that lies by itself costs."""
     return SEGMENT_BYTES if rule == WARP_LINES else SECTOR_BYTES
 
 
-@kernel
+@kernel(lent=True)
 def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
     """Transactions of one memory instruction, and their bytes.
 
@@ -72,18 +72,21 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     return count, total
 
 
-@kernel
+@kernel(lent=True)
 def touched_lines(addresses: Any, lanes: int) -> int:
     """Distinct lines of 128 bytes of one memory instruction; parameters as of ``transactions``."""
     count: int = _segments(addresses, 0, lanes, WORD_BYTES, SEGMENT_BYTES, False)[0]
     return count
 
 
-@kernel
+@kernel(lent=True)
 def _segments(
     addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
 ) -> tuple[int, int]:
     """Distinct segments of the lanes first..end-1 and their bytes; ``shrink`` halves a segment that is half unused."""
+    rising = -1 if shrink else _rising_segments(addresses, first, end, segment_bytes)
+    if rising >= 0:
+        return rising, rising * segment_bytes
     count = 0
     total = 0
     served = 0  # bit i: lane first + i
@@ -104,7 +107,18 @@ def _segments(
     return count, total
 
 
-@kernel
+@kernel(lent=True)
+def _rising_segments(addresses: Any, first: int, end: int, segment_bytes: int) -> int:
+    """Distinct segments of lanes whose addresses never fall, as most do; -1 where one falls or a lane is inactive."""
+    falls = addresses[first] < 0
+    count = 1
+    for i in range(first + 1, end):
+        falls |= addresses[i] < addresses[i - 1]
+        count += (addresses[i] ^ addresses[i - 1]) >= segment_bytes
+    return -1 if falls else count
+
+
+@kernel(lent=True)
 def _shrunk(low: int, high: int, segment_bytes: int) -> int:
     """Bytes of the smallest aligned segment, down to 32 bytes, that still holds low..high-1."""
     size = segment_bytes
@@ -113,7 +127,7 @@ def _shrunk(low: int, high: int, segment_bytes: int) -> int:
     return size
 
 
-@kernel
+@kernel(lent=True)
 def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
     """Transactions, and their bytes, when consecutive lanes access consecutive 4-byte words.
 
@@ -131,7 +145,7 @@ def contiguous(start: int, size: int, rule: int) -> tuple[int, int]:
     return warps * count + n, warps * total + b
 
 
-@kernel
+@kernel(lent=True)
 def _one_warp(start: int, size: int, rule: int) -> tuple[int, int]:
     """``contiguous`` for at most 128 bytes."""
     if rule != HALF_WARP_SEGMENTS:

@@ -37,17 +37,24 @@ class Kernel(Protocol):
 @overload
 def kernel(function: Callable[..., Any]) -> Kernel: ...
 @overload
-def kernel(*, error_model: str) -> Callable[[Callable[..., Any]], Kernel]: ...
+def kernel(*, error_model: str = ..., lent: bool = ...) -> Callable[[Callable[..., Any]], Kernel]: ...
 def kernel(
-    function: Callable[..., Any] | None = None, *, error_model: str = "python"
+    function: Callable[..., Any] | None = None, *, error_model: str = "python", lent: bool = False
 ) -> Kernel | Callable[[Callable[..., Any]], Kernel]:
     """Compile a function where it is first called; it releases the GIL, and what was compiled is kept on disk.
 
-    ``@kernel``, or ``@kernel(error_model="numpy")`` where a division by zero gives inf or nan instead of an error.
+    Parameters
+    ----------
+    function : callable
+    error_model : {"python", "numpy"}
+        ``"numpy"``: a division by zero gives inf or nan instead of an error.
+    lent : bool
+        The arrays that it takes are the caller's, and it makes none: then compiled code counts no references to them.
+        Counting calls a function twice for each array (of a tuple, too) of each call, more than a small kernel's work.
     """
 
     def compiled(function: Callable[..., Any]) -> Kernel:
-        dispatcher: Any = njit(nogil=True, error_model=error_model)(function)
+        dispatcher: Any = njit(nogil=True, error_model=error_model, _nrt=not lent)(function)
         if hasattr(dispatcher, "py_func"):  # not where NUMBA_DISABLE_JIT is set
             dispatcher._cache = _KernelCache(dispatcher)  # noqa: SLF001 - numba has no public way to name a cache
         return dispatcher  # type: ignore[no-any-return]

@@ -75,7 +75,7 @@ def _new_scratch(bins: int, counting: bool) -> Any:
     return BinScratch(np.empty(RING, i64), np.zeros(bins, i64), stamp, np.zeros(2, i64), np.zeros(bins, i64))
 
 
-@kernel
+@kernel(lent=True)
 def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, end: int, events: Any) -> tuple[int, int]:
     """Read 512 counts and append their sub-triangles in order; returns the next triangle and the ring's end.
 
@@ -110,7 +110,7 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
     return go_on, write
 
 
-@kernel
+@kernel(lent=True)
 def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int]:
     """Boxes of a warp's triangles; returns the path that follows from them, and the bins of the largest box."""
     largest, path = 1, SINGLE
@@ -131,7 +131,7 @@ def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBo
     return path, largest
 
 
-@kernel
+@kernel(lent=True)
 def _emit_warp(
     given: BinInput,
     path: int,
@@ -167,7 +167,7 @@ def _emit_warp(
         events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
-@kernel
+@kernel(lent=True)
 def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
     """Distinct bins of a warp whose boxes are one bin each."""
     distinct = 0
@@ -181,7 +181,7 @@ def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
     return distinct
 
 
-@kernel
+@kernel(lent=True)
 def _count_warp(
     given: BinInput, path: int, largest: int, boxes: WarpBoxes, lanes: int, scratch: BinScratch, first: int, events: Any
 ) -> None:

@@ -12,7 +12,7 @@ ENTRY_BYTES = 4
 SINGLE, FAST, SLOW = 0, 1, 2  # path of a warp: all boxes one bin, none over 2 x 2, anything
 
 
-@kernel
+@kernel(lent=True)
 def count_load(events: Any, loads: int, segments: int, size: int) -> None:
     """Count loads, their transactions and bytes."""
     events[BinRasterEvent.LOAD] += loads
@@ -20,7 +20,7 @@ def count_load(events: Any, loads: int, segments: int, size: int) -> None:
     events[BinRasterEvent.LOAD_BYTES] += size
 
 
-@kernel
+@kernel(lent=True)
 def count_atomic(events: Any, executed: int) -> None:
     """One thread's global atomic: a draw, or the allocation of a round's segments."""
     events[BinRasterEvent.ATOMIC] += executed
@@ -29,7 +29,7 @@ def count_atomic(events: Any, executed: int) -> None:
     events[BinRasterEvent.ATOMIC_DEPTH] += executed
 
 
-@kernel
+@kernel(lent=True)
 def count_visible(subtriangles: Any, events: Any) -> None:
     """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
     most = 0
@@ -39,7 +39,7 @@ def count_visible(subtriangles: Any, events: Any) -> None:
     events[BinRasterEvent.MULTI_WARPS] += most > 1
 
 
-@kernel
+@kernel(lent=True)
 def count_bins(bins: int, events: Any) -> None:
     """Count the warps of a round with a bin each, and the clears of the masks of all warps."""
     warps = (bins + WARP - 1) // WARP
@@ -50,7 +50,7 @@ def count_bins(bins: int, events: Any) -> None:
     events[BinRasterEvent.MASK_LANES] += BLOCK // WARP * min(bins, WARP)
 
 
-@kernel
+@kernel(lent=True)
 def count_longest(walk: int, steps: int, paths: int, events: Any) -> None:
     """Count what a round waits for: its longest walk, its most steps of a slow warp, and the paths that are taken."""
     events[BinRasterEvent.LONGEST_WALKS] += walk
@@ -60,7 +60,7 @@ def count_longest(walk: int, steps: int, paths: int, events: Any) -> None:
     events[BinRasterEvent.SLOW_ROUNDS] += (paths >> SLOW) & 1
 
 
-@kernel
+@kernel(lent=True)
 def count_segments(given: Any, counts: Any, scratch: Any, events: Any) -> None:
     """Count new segments of a round: a bin needs one where its entries pass a multiple of 512.
 
@@ -87,7 +87,7 @@ def count_segments(given: Any, counts: Any, scratch: Any, events: Any) -> None:
     count_atomic(events, fresh > 0)
 
 
-@kernel
+@kernel(lent=True)
 def count_closing(given: Any, counts: Any, scratch: Any, events: Any) -> None:
     """Count the open segments at the end of a batch, and the writes of their counts."""
     for first in range(0, counts.size, WARP):
@@ -102,18 +102,18 @@ def count_closing(given: Any, counts: Any, scratch: Any, events: Any) -> None:
         _count_store(events, stores, given.segment_bytes)
 
 
-@kernel
+@kernel(lent=True)
 def _count_store(events: Any, segments: int, size: int) -> None:
     events[BinRasterEvent.STORE_TRANSACTIONS] += segments
     events[BinRasterEvent.STORE_BYTES] += segments * size
 
 
-@kernel
+@kernel(lent=True)
 def _sectors(first: int, words: int, size: int) -> int:
     """Memory segments of ``words`` words from word ``first`` on."""
     return ((first + words) * ENTRY_BYTES - 1) // size - first * ENTRY_BYTES // size + 1
 
 
-@kernel
+@kernel(lent=True)
 def _segments(entries: int) -> int:
     return (entries + BIN_SEGMENT - 1) // BIN_SEGMENT

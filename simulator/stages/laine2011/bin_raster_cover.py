@@ -44,7 +44,7 @@ def new_boxes() -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def entry_slot(entry: Any, misc: Any) -> Any:
     """Slot of a queue entry: the triangle's own, or the sub-triangle's in the run that its header's word points to."""
     part = entry & 7
@@ -53,7 +53,7 @@ def entry_slot(entry: Any, misc: Any) -> Any:
     return np.int64(misc[entry >> 3]) + part
 
 
-@kernel
+@kernel(lent=True)
 def lane_box(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int, last_x: int, last_y: int) -> None:
     """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
     x0, y0, x1, y1, x2, y2 = (
@@ -72,7 +72,7 @@ def lane_box(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: 
     box[3] = min(max(max(y0, y1, y2) >> shift, 0), last_y) - low_y + 1
 
 
-@kernel
+@kernel(lent=True)
 def lane_edges(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int) -> None:
     """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
     side = np.int64(1) << shift
@@ -85,7 +85,7 @@ def lane_edges(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift
         boxes.edge[lane, k] = (ax - corner_x) * ey - (ay - corner_y) * ex + side * (max(ex, 0) - min(ey, 0))
 
 
-@kernel
+@kernel(lent=True)
 def touches(boxes: WarpBoxes, lane: int, column: int, row: int) -> bool:
     """Whether the triangle touches the closed square (column, row) of its box: no edge has it wholly outside."""
     for k in range(3):
@@ -94,7 +94,7 @@ def touches(boxes: WarpBoxes, lane: int, column: int, row: int) -> bool:
     return True
 
 
-@kernel
+@kernel(lent=True)
 def _count_corner(boxes: WarpBoxes, lanes: int, stride: int, wide: bool, high: bool) -> int:
     """Replays of the OR at one corner of all boxes (``wide``/``high``: of those two squares wide/high); -1: no lane."""
     boxes.bank[:] = 0
@@ -108,7 +108,7 @@ def _count_corner(boxes: WarpBoxes, lanes: int, stride: int, wide: bool, high: b
     return deepest - 1
 
 
-@kernel
+@kernel(lent=True)
 def small_votes(boxes: WarpBoxes, lanes: int, stride: int) -> tuple[int, int]:
     """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
     ors, replays = 0, 0
@@ -119,7 +119,7 @@ def small_votes(boxes: WarpBoxes, lanes: int, stride: int) -> tuple[int, int]:
     return ors, replays
 
 
-@kernel
+@kernel(lent=True)
 def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[int, int, int]:
     """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
     ors, replays, ends = 0, 0, 0
@@ -142,7 +142,7 @@ def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[i
     return ors, replays, ends
 
 
-@kernel
+@kernel(lent=True)
 def header_load(slot: Any, lanes: int, segment_bytes: int) -> tuple[int, int]:
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
 

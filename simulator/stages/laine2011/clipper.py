@@ -11,12 +11,12 @@ MAX_VERTICES = 31  # 9 in exact arithmetic; room for every crossing that roundin
 _ONE = np.float32(1)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _plane_value(plane: Any, bary: Any, i: int) -> Any:
     return fma(plane[2], bary[i, 1], fma(plane[1], bary[i, 0], plane[0]))
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _clip_plane(plane: Any, source: Any, target: Any, n: int) -> Any:
     """Keep the part of an n-gon where the plane is not negative; returns its number of vertices."""
     if n < 3:
@@ -40,7 +40,7 @@ def _clip_plane(plane: Any, source: Any, target: Any, n: int) -> Any:
     return kept
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def clip_triangle(corners: Any, polygon: Any, spare: Any, plane: Any, steps: Any) -> Any:
     """Clip a triangle whose corners are clip positions; an axis is clipped only where a corner lies outside it.
 
@@ -83,7 +83,7 @@ def clip_triangle(corners: Any, polygon: Any, spare: Any, plane: Any, steps: Any
     return n if n >= 3 else 0
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def between(a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
     """One component of a clip position at barycentrics (u, v), from those of the three corners."""
     return fma(c - a, v, fma(b - a, u, a))

@@ -64,7 +64,7 @@ class Place(NamedTuple):
     move_y: int
 
 
-@kernel
+@kernel(lent=True)
 def _place(given: CoarseInput, b: int) -> Any:
     bx, by = b % given.bins_x, b // given.bins_x
     return Place(
@@ -77,7 +77,7 @@ def _place(given: CoarseInput, b: int) -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int, int]:
     """Boxes of a warp's triangles; returns its case, tiles of the largest and of the union box, and its rows."""
     small = True
@@ -101,7 +101,7 @@ def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: 
     return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, rows
 
 
-@kernel
+@kernel(lent=True)
 def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, queues: Any) -> None:
     """Append a warp's triangles to the tiles that they touch."""
     for lane in range(lanes):
@@ -115,7 +115,7 @@ def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, queues: Any
                     counts[tile] += 1
 
 
-@kernel
+@kernel(lent=True)
 def _count_warp(
     given: CoarseInput,
     case: int,
@@ -154,14 +154,14 @@ def _count_warp(
     _count_load(events, 1, *header_load(boxes.slot, lanes, given.segment_bytes))
 
 
-@kernel
+@kernel(lent=True)
 def _count_load(events: Any, loads: int, segments: int, size: int) -> None:
     events[CoarseRasterEvent.LOAD] += loads
     events[CoarseRasterEvent.LOAD_TRANSACTIONS] += segments
     events[CoarseRasterEvent.LOAD_BYTES] += size
 
 
-@kernel
+@kernel(lent=True)
 def _count_atomic(events: Any, executed: int) -> None:
     """One thread's global atomic."""
     events[CoarseRasterEvent.ATOMIC] += executed
@@ -170,7 +170,7 @@ def _count_atomic(events: Any, executed: int) -> None:
     events[CoarseRasterEvent.ATOMIC_DEPTH] += executed
 
 
-@kernel
+@kernel(lent=True)
 def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, events: Any) -> None:
     """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
     fresh, touched, emits, stores = 0, 0, 0, 0
@@ -210,7 +210,7 @@ def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, event
     _count_atomic(events, fresh > 0)
 
 
-@kernel
+@kernel(lent=True)
 def _count_tails(given: CoarseInput, counts: Any, tails: Any, events: Any) -> None:
     """Count the writes that end the tiles' lists: the last segment's link, and its count where it is not full.
 
@@ -229,7 +229,7 @@ def _count_tails(given: CoarseInput, counts: Any, tails: Any, events: Any) -> No
         events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
-@kernel
+@kernel(lent=True)
 def _count_merge(given: CoarseInput, b: int, events: Any) -> None:
     """Count the merges: a round takes whole segments until more than 512 entries wait, or none is left."""
     write, read, batch, taken = 0, 0, 0, 0

@@ -9,20 +9,22 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import tile_bits
 
 TILE = 8  # pixels
+_FAR = 1 << 30
 _EDGE_0, _EDGE_1, _EDGE_2 = np.int64(0), np.int64(1), np.int64(2)  # a kernel is compiled anew for each literal
 SAMPLE_COLUMN = np.array([[0] * 8, [0, 1] + [0] * 6, [1, 3, 0, 2] + [0] * 4, [7, 2, 4, 0, 6, 3, 1, 5]])
 """Column of the sample in each row of the pixel, by log2 of the samples."""
 
 
-@kernel
+@kernel(lent=True)
 def _exclusive(dx: int, dy: int) -> Any:
     """1 where a sample exactly on the edge is outside (right edges, and upper horizontal ones), else 0."""
     return 1 if dy > 0 or (dy == 0 and dx <= 0) else 0
 
 
-@kernel
+@kernel(lent=True)
 def _first_value(header: Any, k: int, x: int, y: int) -> Any:
     """Edge k -> k + 1 of the triangle at (x, y), less its threshold; and the edge's direction. Negative: outside."""
     m = (k + 1) % 3
@@ -31,7 +33,7 @@ def _first_value(header: Any, k: int, x: int, y: int) -> Any:
     return (px - x) * dy - (py - y) * dx - _exclusive(dx, dy), dx, dy
 
 
-@kernel
+@kernel(lent=True)
 def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels of a tile whose centre is covered.
 
@@ -46,50 +48,34 @@ def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     -------
     uint64
     """
-    x0, x1, x2 = np.int64(header[0]), np.int64(header[2]), np.int64(header[4])
-    y0, y1, y2 = np.int64(header[1]), np.int64(header[3]), np.int64(header[5])
-    first = max((min(x0, x1, x2) - left + 7) >> 4, 0)
-    last = min((max(x0, x1, x2) - left - 8) >> 4, TILE - 1)
-    low = max((min(y0, y1, y2) - bottom + 7) >> 4, 0)
-    high = min((max(y0, y1, y2) - bottom - 8) >> 4, TILE - 1)
-    return _box_mask(header, left, bottom, first, last, low, high, 0)
+    return _mask(header, left, bottom, 0)
 
 
-@kernel
+@kernel(lent=True)
 def square_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels whose square may be touched: the conservative mask of several samples a pixel."""
-    return _box_mask(header, left, bottom, 0, TILE - 1, 0, TILE - 1, 8)
+    return _mask(header, left, bottom, 8)
 
 
-@kernel
-def _box_mask(header: Any, left: int, bottom: int, first: int, last: int, low: int, high: int, margin: int) -> Any:
-    """Mask of the pixels in a box, with every edge moved outwards by ``margin`` in both axes."""
-    mask = np.uint64(0)
-    if first > last or low > high:
-        return mask
-    x, y = left + 16 * first + 8, bottom + 16 * low + 8
-    a, ax, ay = _first_value(header, _EDGE_0, x, y)
-    b, bx, by = _first_value(header, _EDGE_1, x, y)
-    c, cx, cy = _first_value(header, _EDGE_2, x, y)
-    a += margin * (abs(ax) + abs(ay))
-    b += margin * (abs(bx) + abs(by))
-    c += margin * (abs(cx) + abs(cy))
-    for row in range(low, high + 1):
-        bits = np.int64(0)
-        ea, eb, ec = a, b, c
-        for column in range(first, last + 1):
-            bits |= ((~(ea | eb | ec) >> 63) & 1) << (7 - column)
-            ea -= 16 * ay
-            eb -= 16 * by
-            ec -= 16 * cy
-        mask |= np.uint64(bits) << np.uint64(8 * row)
-        a += 16 * ax
-        b += 16 * bx
-        c += 16 * cx
-    return mask
+@kernel(lent=True)
+def _mask(header: Any, left: int, bottom: int, margin: int) -> Any:
+    """Mask of a tile's pixels, with every edge moved outwards by ``margin`` in both axes."""
+    x, y = left + 8, bottom + 8
+    a = _edge(header, _EDGE_0, x, y, margin)
+    b = _edge(header, _EDGE_1, x, y, margin)
+    c = _edge(header, _EDGE_2, x, y, margin)
+    return tile_bits(a, b, c)
 
 
-@kernel
+@kernel(lent=True)
+def _edge(header: Any, k: int, x: int, y: int, margin: int) -> Any:
+    """An edge from pixel to pixel: beyond 2**30 no step in a tile changes the sign, and 32 bits hold the rest."""
+    value, dx, dy = _first_value(header, k, x, y)
+    value += margin * (abs(dx) + abs(dy))
+    return min(max(value, -_FAR), _FAR), 16 * dy, 16 * dx
+
+
+@kernel(lent=True)
 def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
     """Find the samples of one pixel that are covered.
 
@@ -121,7 +107,7 @@ def sample_mask(header: Any, x: int, y: int, log_samples: int) -> Any:
     return mask
 
 
-@kernel
+@kernel(lent=True)
 def centroid_sample(mask: Any, log_samples: int) -> Any:
     """Covered sample nearest to the centre; -1, the centre itself, where all or none are covered."""
     samples = 1 << log_samples

@@ -86,7 +86,58 @@ def _lowest_bit(bits):  # type: ignore[no-untyped-def]
     return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - as above
 
 
-@kernel
+def tile_bits(a: Any, b: Any, c: Any) -> Any:
+    """Pixels of a tile of 8 x 8 at which none of three edge functions is negative, as a uint64.
+
+    Parameters
+    ----------
+    a, b, c : tuple of int
+        Of each edge: its value at the lower left pixel, what a step right takes from it, and what a step up adds. All
+        sums are within int32.
+
+    Returns
+    -------
+    uint64
+        Pixel (x, y) at bit 8 * y + 7 - x.
+    """
+    edges = [tuple(map(int, edge)) for edge in (a, b, c)]
+    pixels = [(x, y) for y in range(8) for x in reversed(range(8))]
+    inside = [all(start - right * x + up * y >= 0 for start, right, up in edges) for x, y in pixels]
+    return np.uint64(sum(1 << i for i, is_inside in enumerate(inside) if is_inside))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _llvm_tile_bits(_context: Any, a: Any, b: Any, c: Any) -> Any:
+    from llvmlite import ir
+
+    lane, row = ir.IntType(32), ir.VectorType(ir.IntType(32), 8)
+
+    def spread(builder: Any, value: Any) -> Any:
+        one = builder.insert_element(ir.Constant(row, ir.Undefined), builder.trunc(value, lane), ir.Constant(lane, 0))
+        return builder.shuffle_vector(one, ir.Constant(row, ir.Undefined), ir.Constant(row, [0] * 8))
+
+    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        columns, word = ir.Constant(row, list(reversed(range(8)))), ir.IntType(64)
+        edges = [[spread(builder, builder.extract_value(edge, i)) for i in range(3)] for edge in args]
+        values = [builder.sub(start, builder.mul(right, columns)) for start, right, _ in edges]
+        bits = ir.Constant(word, 0)
+        for y in range(8):
+            signs = builder.or_(builder.or_(values[0], values[1]), values[2])
+            inside = builder.icmp_signed(">=", signs, ir.Constant(row, [0] * 8))
+            eight = builder.zext(builder.bitcast(inside, ir.IntType(8)), word)
+            bits = builder.or_(bits, builder.shl(eight, ir.Constant(word, 8 * y)))
+            values = [builder.add(value, up) for value, (_, _, up) in zip(values, edges, strict=True)]
+        return bits
+
+    return types.uint64(a, b, c), codegen
+
+
+@overload(tile_bits)
+def _tile_bits(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
+    return lambda a, b, c: _llvm_tile_bits(a, b, c)  # noqa: PLW0108 - numba needs a function
+
+
+@kernel(lent=True)
 def round_to_int32(value: Any) -> Any:
     """Float to int32: half to even, saturating, NaN to 0; returned as int64."""
     if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
@@ -95,7 +146,7 @@ def round_to_int32(value: Any) -> Any:
     return np.int64((wide + _ROUND) - _ROUND)
 
 
-@kernel
+@kernel(lent=True)
 def round_to_uint32(value: Any) -> Any:
     """Float to uint32: half to even, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
@@ -104,7 +155,7 @@ def round_to_uint32(value: Any) -> Any:
     return np.int64((wide + _ROUND) - _ROUND)
 
 
-@kernel
+@kernel(lent=True)
 def truncate_to_uint32(value: Any) -> Any:
     """Float to uint32 towards zero, saturating, negative and NaN to 0; returned as int64."""
     if not value > np.float32(0):
@@ -112,19 +163,19 @@ def truncate_to_uint32(value: Any) -> Any:
     return np.int64(min(np.float64(value), 4294967295.0))
 
 
-@kernel
+@kernel(lent=True)
 def wrap_int32(value: Any) -> Any:
     """Low 32 bits as a signed number."""
     return ((value + 2147483648) & 4294967295) - 2147483648
 
 
-@kernel
+@kernel(lent=True)
 def float_bits(value: Any) -> Any:
     """Bits of a float32 as a signed number."""
     return np.int64(np.float32(value).view(np.int32))
 
 
-@kernel
+@kernel(lent=True)
 def biased_exponent(value: Any) -> Any:
     """Exponent field of a float32; 0 for anything negative."""
     return max(float_bits(value), 0) >> 23

@@ -26,6 +26,7 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     new_tile,
     start_tile,
 )
+from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import draw_tile_single
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work, known_tiles
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
@@ -51,30 +52,37 @@ class FrameBuffers(NamedTuple):
     ids: NDArray[np.int32]  # input triangle, -1 where nothing was drawn
 
 
-@kernel
+@kernel(lent=True)
 def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+    tile.owner[:] = -1
+    if draw.clear:
+        tile.depth[:] = draw.clear_depth
+        tile.color[:] = draw.clear_color
+        return
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
             at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            if draw.clear:
-                tile.color[at], tile.depth[at], tile.ids[at] = draw.clear_color, draw.clear_depth, -1
+            tile.depth[at], tile.color[at] = buffers.depth[sample, j, i], buffers.color[sample, j, i]
+
+
+@kernel(lent=True)
+def _store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+    for sample in range(1 << draw.log_samples):
+        for p in range(PIXELS):
+            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
+            slot, color = tile.owner[at], tile.color[at]
+            if slot >= 0:
+                buffers.ids[sample, j, i] = setup.inputs[slot]
+                if draw.shade_late:
+                    color = shade(setup.planes, slot, colors, i, j, -1, draw)
+            elif draw.clear:
+                buffers.ids[sample, j, i] = -1
             else:
-                tile.color[at] = buffers.color[sample, j, i]
-                tile.depth[at] = buffers.depth[sample, j, i]
-                tile.ids[at] = buffers.ids[sample, j, i]
+                continue
+            buffers.depth[sample, j, i], buffers.color[sample, j, i] = tile.depth[at], color
 
 
-@kernel
-def _store_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
-    for sample in range(1 << draw.log_samples):
-        for p in range(PIXELS):
-            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            buffers.color[sample, j, i] = tile.color[at]
-            buffers.depth[sample, j, i] = tile.depth[at]
-            buffers.ids[sample, j, i] = tile.ids[at]
-
-
-@kernel
+@kernel(lent=True)
 def _count_tile(draw: Draw, row: Any) -> None:
     """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
 
@@ -147,10 +155,10 @@ def _draw_tiles(
         draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
         if table is not None:
             _count_tile(draw, row)
-        _store_tile(buffers, draw, tile, x, y)
+        _store_tile(buffers, setup, colors, draw, tile, x, y)
 
 
-@kernel
+@kernel(lent=True)
 def draw_tile(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, several: Any, row: Any
 ) -> None:
@@ -240,6 +248,7 @@ def fine_raster(
         blend=blend,
         write_color=write_color,
         interpolate=interpolate,
+        shade_late=write_color and not blend and samples == 1 and release == "1.1",
         clear=buffers is None,
         clear_color=clear_color,
         clear_depth=clear_depth_value(clear_depth),
@@ -248,11 +257,11 @@ def fine_raster(
         tiles_x=-(-width // TILE),
         coalescing=int(simt.coalescing),
     )
-    if buffers is None:
-        buffers = new_buffers(width, height, samples, cleared=units is None)
     if colors is None:
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
     drawn = active_tiles if units is None else active_tiles[units]
+    if buffers is None:
+        buffers = new_buffers(width, height, samples, cleared=units is None and len(drawn) < len(tile_starts) - 1)
     table = np.zeros((len(drawn), len(FineRasterEvent)), np.int64) if counting else None
     with np.errstate(all="ignore"):
         for_parts(

@@ -9,19 +9,21 @@ import numpy as np
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN, centroid_sample, sample_mask
-from tilestamp.simulator.stages.laine2011.exact import popcount
+from tilestamp.simulator.stages.laine2011.exact import lowest_bit, popcount
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
+    HEAD,
     NEXT,
     PIXELS,
+    TAIL,
     UPDATE,
+    WARP,
     ZMAX,
     Draw,
     FineRasterEvent,
     Tile,
     refill,
-    take,
     update_zmax,
 )
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over, shade
@@ -32,7 +34,27 @@ from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 _LOW = 0xFFFFFFFF
 
 
-@kernel
+@kernel(lent=True)
+def _take(tile: Tile) -> Any:
+    """Move up to 32 fragments in order from the queue to the lanes; returns how many."""
+    state = tile.state
+    n = 0
+    while n < WARP and state[HEAD] < state[TAIL]:
+        mask = tile.masks[state[HEAD]]
+        slot = tile.slots[state[HEAD]]
+        while n < WARP and mask != np.uint64(0):
+            tile.pixel[n] = lowest_bit(mask)
+            tile.slot[n] = slot
+            mask &= mask - np.uint64(1)
+            n += 1
+        tile.masks[state[HEAD]] = mask
+        if mask == np.uint64(0):
+            state[HEAD] += 1
+    state[FRAGMENTS] -= n
+    return n
+
+
+@kernel(lent=True)
 def _hidden(record: Any, misc: Any, zmax: Any, x: int, y: int, s: int) -> Any:
     """Whether a fragment lies behind all samples of its pixel, by the nearest depth that it could have there."""
     zx, zy, zb, slope = np.int64(record[0]), np.int64(record[1]), np.int64(record[2]), np.int64(record[3])
@@ -40,7 +62,7 @@ def _hidden(record: Any, misc: Any, zmax: Any, x: int, y: int, s: int) -> Any:
     return (nearest >= zmax and nearest < ((nearest + 2 * slope) & _LOW)) or (np.int64(misc) & 0xFFFFF000) >= zmax
 
 
-@kernel
+@kernel(lent=True)
 def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bottom: int, row: Any) -> Any:
     """Depth and sample tests of n fragments; survivors move to the front, their samples to ``tile.mask``."""
     kept = killed = hits = 0
@@ -69,7 +91,7 @@ def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bot
     return kept
 
 
-@kernel
+@kernel(lent=True)
 def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, color: Any, x: int, y: int) -> Any:
     """Depth test and write of one sample of one survivor; True where it was written."""
     p, slot = tile.pixel[lane], tile.slot[lane]
@@ -81,13 +103,13 @@ def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, 
         if depth >= tile.depth[at]:
             return False
         tile.depth[at] = depth
-    tile.ids[at] = setup.inputs[slot]
+    tile.owner[at] = slot
     if draw.write_color:
         tile.color[at] = blend_over(color, tile.color[at]) if draw.blend else color
     return True
 
 
-@kernel
+@kernel(lent=True)
 def _rop(
     setup: Setup, draw: Draw, tile: Tile, kept: int, sample: int, colors_of_lanes: Any, column: int, line: int
 ) -> Any:
@@ -107,7 +129,7 @@ def _rop(
     return writes, longest if draw.depth or draw.blend else min(longest, 1)
 
 
-@kernel
+@kernel(lent=True)
 def _lower_zmax(tile: Tile, kept: int, samples: int) -> None:
     """Take the farthest sample of each written pixel anew."""
     for lane in range(kept):
@@ -121,7 +143,7 @@ def _lower_zmax(tile: Tile, kept: int, samples: int) -> None:
             tile.zmax[p] = farthest
 
 
-@kernel
+@kernel(lent=True)
 def _shade_survivors(
     setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, shaded: Any, column: int, line: int
 ) -> None:
@@ -129,10 +151,10 @@ def _shade_survivors(
         p = tile.pixel[lane]
         x, y = column + 7 - (p & 7), line + (p >> 3)
         centroid = centroid_sample(tile.mask[lane], draw.log_samples)
-        shaded[lane] = shade(setup.planes[tile.slot[lane]], colors, x, y, centroid, draw)
+        shaded[lane] = shade(setup.planes, tile.slot[lane], colors, x, y, centroid, draw)
 
 
-@kernel
+@kernel(lent=True)
 def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, row: Any) -> None:
     """Count the surface reads and writes of one sample: a row of the tile is one 32-byte segment."""
     read = written = 0
@@ -150,7 +172,7 @@ def _count_sample(draw: Draw, tile: Tile, kept: int, sample: int, longest: Any, 
     row[FineRasterEvent.STORE_BYTES] += 32 * rows
 
 
-@kernel
+@kernel(lent=True)
 def draw_tile_multi(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
 ) -> None:
@@ -165,14 +187,14 @@ def draw_tile_multi(
             refill(setup, entries, draw, tile, left, bottom, row)
         if state[FRAGMENTS] == 0:
             return
-        n = take(tile)
+        n = _take(tile)
         if row is not None and draw.depth:
-            count_reads(setup, draw, tile, n, np.int64(0b0001), row)
+            count_reads(setup, draw, tile.slot, tile.addresses, n, 1, row)
         kept = _cull_fragments(setup, draw, tile, n, left, bottom, row)
         if row is not None and kept > 0:
             row[FineRasterEvent.SHADE_ROUNDS] += 1
             row[FineRasterEvent.SHADE_LANES] += kept
-            count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
+            count_reads(setup, draw, tile.slot, tile.addresses, kept, 3 if draw.interpolate else 1, row)
         if draw.write_color:
             _shade_survivors(setup, colors, draw, tile, kept, shaded, column, line)
         for sample in range(samples):

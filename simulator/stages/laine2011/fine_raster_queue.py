@@ -9,7 +9,7 @@ from tilestamp.models.coalescing import contiguous, smallest_transaction_bytes, 
 from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
-from tilestamp.simulator.stages.laine2011.exact import lowest_bit, popcount
+from tilestamp.simulator.stages.laine2011.exact import popcount
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
@@ -77,6 +77,7 @@ class Draw(NamedTuple):
     blend: bool
     write_color: bool
     interpolate: bool
+    shade_late: bool  # each pixel once, when the tile is done: no later fragment sees its colour
     clear: bool  # deferred clear: tiles start from the clear values
     clear_color: int
     clear_depth: int
@@ -91,9 +92,10 @@ class Tile(NamedTuple):
 
     depth: np.ndarray  # (samples * 64,) int64
     color: np.ndarray  # (samples * 64,) int64, RGBA from the low byte up
-    ids: np.ndarray  # (samples * 64,) int64
+    owner: np.ndarray  # (samples * 64,) int64: slot of the last write, -1 where there was none
     zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only
-    chain: np.ndarray  # (64,) int64: writes of the current round
+    before: np.ndarray  # (64,) int64: depth of a pixel before the round, where the round has hit it, and ...
+    chain: np.ndarray  # (64,) int64: ... how often
     slots: np.ndarray  # (96,) int64: queue of triangles ...
     masks: np.ndarray  # (96,) uint64: ... and the fragments that they have left
     state: np.ndarray  # (7,) int64, see below
@@ -111,13 +113,13 @@ def new_tile(samples: int) -> Any:
     """Scratch for one warp."""
     many, i64 = samples * PIXELS, np.int64
     return Tile(
-        np.empty(many, i64), np.empty(many, i64), np.empty(many, i64), np.empty(PIXELS, i64), np.zeros(PIXELS, i64),
-        np.empty(QUEUE + SEGMENT, i64), np.empty(QUEUE + SEGMENT, np.uint64), np.zeros(7, i64),
+        np.empty(many, i64), np.empty(many, i64), np.empty(many, i64), np.empty(PIXELS, i64), np.empty(PIXELS, i64),
+        np.zeros(PIXELS, i64), np.empty(QUEUE + SEGMENT, i64), np.empty(QUEUE + SEGMENT, np.uint64), np.zeros(7, i64),
         np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64),
     )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def corner(tile_index: int, draw: Draw) -> Any:
     """Lower left corner of a tile in the units of headers."""
     left = (tile_index % draw.tiles_x) * (16 * TILE) - draw.half_width
@@ -125,17 +127,20 @@ def corner(tile_index: int, draw: Draw) -> Any:
     return left, bottom
 
 
-@kernel
+@kernel(lent=True)
 def update_zmax(depths: Any, state: Any, row: Any) -> None:
     """Take the tile's largest depth anew, if a fragment has covered a pixel that had it."""
     if state[UPDATE]:
-        state[ZMAX] = depths[:PIXELS].max()
+        largest = depths[0]
+        for p in range(1, PIXELS):
+            largest = max(largest, depths[p])
+        state[ZMAX] = largest
         state[UPDATE] = 0
         if row is not None:
             row[FineRasterEvent.ZMAX_UPDATES] += 1
 
 
-@kernel
+@kernel(lent=True)
 def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     """Count a load of ``size`` bytes by each of n lanes at ``tile.addresses``."""
     count, read = transactions(tile.addresses, n, size, draw.coalescing)
@@ -143,32 +148,29 @@ def count_gather(tile: Tile, n: int, size: int, draw: Draw, row: Any) -> None:
     row[FineRasterEvent.LOAD_BYTES] += read
 
 
-@kernel
+@kernel(lent=True)
 def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read up to 32 entries, cull them by depth, and queue those with a non-empty mask."""
     state = tile.state
     first, last = state[NEXT], min(state[NEXT] + SEGMENT, state[END])
     state[NEXT] = last
-    killed = empty = 0
-    queued = state[TAIL]
+    limit = state[ZMAX] + draw.later_wins
+    killed = fragments = 0
+    queued = tail = state[TAIL]
     for k in range(first, last):
         slot = np.int64(entries[k])
         if row is not None:
             tile.addresses[k - first] = slot * HEADER_BYTES
-        if draw.depth:
-            nearest = np.int64(setup.misc[slot]) & 0xFFFFF000
-            if nearest > state[ZMAX] or (nearest == state[ZMAX] and not draw.later_wins):
-                killed += 1
-                continue
+        if draw.depth and np.int64(setup.misc[slot]) & 0xFFFFF000 >= limit:
+            killed += 1
+            continue
         header = setup.headers[slot]
         mask = square_mask(header, left, bottom) if draw.log_samples > 0 else pixel_mask(header, left, bottom)
-        if mask == np.uint64(0):
-            empty += 1
-            continue
-        tile.slots[state[TAIL]] = slot
-        tile.masks[state[TAIL]] = mask
-        state[TAIL] += 1
-        state[FRAGMENTS] += popcount(mask)
+        tile.slots[tail], tile.masks[tail] = slot, mask
+        tail += mask != np.uint64(0)
+        fragments += popcount(mask)
+    state[TAIL] = tail
+    state[FRAGMENTS] += fragments
     if row is not None:
         n = last - first
         row[FineRasterEvent.SEGMENTS] += 1
@@ -176,10 +178,10 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
         row[FineRasterEvent.EARLY_Z_LANES] += n if draw.depth else 0
         row[FineRasterEvent.EARLY_Z_KILLS] += killed
         row[FineRasterEvent.COVERAGE_LANES] += n - killed
-        row[FineRasterEvent.EMPTY_MASKS] += empty
+        row[FineRasterEvent.EMPTY_MASKS] += n - killed - (tail - queued)
         row[FineRasterEvent.SAMPLE_TESTS] += PIXELS * (n - killed)
-        row[FineRasterEvent.FULL_SEGMENTS] += state[TAIL] > queued
-        row[FineRasterEvent.FULL_LANES] += state[TAIL] - queued
+        row[FineRasterEvent.FULL_SEGMENTS] += tail > queued
+        row[FineRasterEvent.FULL_LANES] += tail - queued
         row[FineRasterEvent.PARTIAL_SEGMENTS] += n < SEGMENT
         row[FineRasterEvent.LIST_WARPS] += 1
         loads, size = contiguous(0, n * ENTRY_BYTES, draw.coalescing)  # the entries, in a line of their own
@@ -188,7 +190,7 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
         count_gather(tile, n, HEADER_BYTES, draw, row)
 
 
-@kernel
+@kernel(lent=True)
 def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any) -> None:
     """Read on until 32 fragments are queued or the list ends."""
     state = tile.state
@@ -203,27 +205,7 @@ def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom
         read_segment(setup, entries, draw, tile, left, bottom, row)
 
 
-@kernel
-def take(tile: Tile) -> Any:
-    """Move up to 32 fragments in order from the queue to the lanes; returns how many."""
-    state = tile.state
-    n = 0
-    while n < WARP and state[HEAD] < state[TAIL]:
-        mask = tile.masks[state[HEAD]]
-        slot = tile.slots[state[HEAD]]
-        while n < WARP and mask != np.uint64(0):
-            tile.pixel[n] = lowest_bit(mask)
-            tile.slot[n] = slot
-            mask &= mask - np.uint64(1)
-            n += 1
-        tile.masks[state[HEAD]] = mask
-        if mask == np.uint64(0):
-            state[HEAD] += 1
-    state[FRAGMENTS] -= n
-    return n
-
-
-@kernel
+@kernel(lent=True)
 def start_tile(tile: Tile, begin: int, end: int) -> None:
     """Empty the queue for a tile whose list is entries begin..end-1."""
     tile.state[:] = 0

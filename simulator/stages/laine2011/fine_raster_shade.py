@@ -9,28 +9,31 @@ from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
 from tilestamp.simulator.stages.laine2011.exact import wrap_int32
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import Draw
 
-_PLANES = np.array([4, 7, 10])  # where the planes of 1/w, u/w and v/w begin in a record
+_W, _U, _V = np.int64(4), np.int64(7), np.int64(10)  # where the planes of 1/w, u/w and v/w begin in a record
 
 
-@kernel(error_model="numpy")
-def _plane(record: Any, at: Any, x: Any, y: Any) -> Any:
-    value = np.int64(record[at]) * x + np.int64(record[at + 1]) * y + np.int64(record[at + 2])
+@kernel(error_model="numpy", lent=True)
+def _plane(planes: Any, slot: Any, at: Any, x: Any, y: Any) -> Any:
+    value = np.int64(planes[slot, at]) * x + np.int64(planes[slot, at + 1]) * y + np.int64(planes[slot, at + 2])
     return np.float32(wrap_int32(value))
 
 
-@kernel
+@kernel(lent=True)
 def _channel(value: Any) -> Any:
-    """Eight bits of a channel in 0..1, rounded to nearest, saturating."""
-    return np.int64(min(max(np.floor(np.float64(value) * 255.0 + 0.5), 0.0), 255.0)) if value == value else 0  # noqa: PLR0124
+    """Eight bits of a channel in 0..1, rounded to nearest, saturating; NaN is 0."""
+    scaled = np.float64(value) * 255.0 + 0.5
+    return np.int64(min(scaled, 255.0)) if scaled > 0.0 else 0
 
 
-@kernel(error_model="numpy")
-def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
+@kernel(error_model="numpy", lent=True)
+def shade(planes: Any, slot: int, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
     """Interpolated vertex colour of one fragment, as 8-bit RGBA.
 
     Parameters
     ----------
-    record : array (16,), uint32
+    planes : array (S, 16), uint32
+    slot : int
+        Of the fragment's record.
     colors : array (V, 4), float32
     x, y : int
         Pixel.
@@ -45,18 +48,18 @@ def shade(record: Any, colors: Any, x: int, y: int, sample: int, draw: Draw) -> 
         if sample >= 0:
             at_x = 2 * ((x << s) + SAMPLE_COLUMN[s, sample]) + 1
             at_y = 2 * ((y << s) + sample) + 1
-        w = np.float32(1) / _plane(record, _PLANES[0], at_x, at_y)
-        u = w * _plane(record, _PLANES[1], at_x, at_y)
-        v = w * _plane(record, _PLANES[2], at_x, at_y)
+        w = np.float32(1) / _plane(planes, slot, _W, at_x, at_y)
+        u = w * _plane(planes, slot, _U, at_x, at_y)
+        v = w * _plane(planes, slot, _V, at_x, at_y)
     t = np.float32(1) - u - v
+    i, j, k = planes[slot, 13], planes[slot, 14], planes[slot, 15]
     packed = np.int64(0)
     for c in range(4):
-        value = t * colors[record[13], c] + u * colors[record[14], c] + v * colors[record[15], c]
-        packed |= _channel(value) << (8 * c)
+        packed |= _channel(t * colors[i, c] + u * colors[j, c] + v * colors[k, c]) << (8 * c)
     return packed
 
 
-@kernel
+@kernel(lent=True)
 def blend_over(source: Any, target: int) -> Any:
     """Source over target, channel by channel, alpha too."""
     alpha = (source >> 24) & 255

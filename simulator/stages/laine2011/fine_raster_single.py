@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import lowest_bit
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
@@ -13,13 +15,12 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     PIXELS,
     TAIL,
     UPDATE,
+    WARP,
     ZMAX,
     Draw,
     FineRasterEvent,
     Tile,
-    count_gather,
     refill,
-    take,
     update_zmax,
 )
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over, shade
@@ -29,110 +30,113 @@ _LOW = 0xFFFFFFFF
 _DATA_BYTES = 4  # a word of the data record
 
 
-@kernel
-def _write(setup: Setup, colors: Any, draw: Draw, tile: Tile, lane: int, x: int, y: int) -> None:
-    """Put one fragment's colour and triangle into the tile."""
-    p, slot = tile.pixel[lane], tile.slot[lane]
-    tile.ids[p] = setup.inputs[slot]
-    if draw.later_wins or not draw.write_color:
-        return
-    color = shade(setup.planes[slot], colors, x, y, -1, draw)
-    tile.color[p] = blend_over(color, tile.color[p]) if draw.blend else color
-
-
-@kernel
-def _depth_test(setup: Setup, draw: Draw, tile: Tile, n: int, column: int, line: int) -> Any:
-    """Test n fragments against the depths before the round; survivors move to the front, depths to ``tile.mask``."""
-    kept = 0
-    state = tile.state
+@kernel(lent=True)
+def count_reads(setup: Setup, draw: Draw, slots: Any, addresses: Any, n: int, parts: int, row: Any) -> None:
+    """Count reads of ``parts`` parts of 16 bytes of the records of n lanes: each touches as many segments."""
     for lane in range(n):
-        p, slot = tile.pixel[lane], tile.slot[lane]
-        record = setup.planes[slot]
-        x, y = column + 7 - (p & 7), line + (p >> 3)
-        depth = (np.int64(record[0]) * x + np.int64(record[1]) * y + np.int64(record[2])) & _LOW
+        addresses[lane] = slots[lane] * setup.planes.shape[1] * _DATA_BYTES
+    count, size = transactions(addresses, n, 16, draw.coalescing)
+    row[FineRasterEvent.LOAD_TRANSACTIONS] += parts * count
+    row[FineRasterEvent.LOAD_BYTES] += parts * size
+
+
+@kernel(lent=True)
+def _fragment(setup: Setup, colors: Any, draw: Draw, tile: Tile, slot: int, p: int, depth: int, x: int, y: int) -> Any:
+    """Depth test and write of one fragment, after all before it; True where it is written."""
+    if draw.depth:
         old = tile.depth[p]
-        if depth > old or (depth == old and not draw.later_wins):
-            continue
-        if old == state[ZMAX]:
-            state[UPDATE] = 1
-        tile.pixel[kept], tile.slot[kept], tile.mask[kept] = p, slot, depth
-        kept += 1
-    return kept
+        if depth >= old + draw.later_wins:
+            return False
+        if old == tile.state[ZMAX]:
+            tile.state[UPDATE] = 1
+        tile.depth[p] = depth
+    tile.owner[p] = slot
+    if draw.blend:
+        tile.color[p] = blend_over(shade(setup.planes, slot, colors, x, y, -1, draw), tile.color[p])
+    return True
 
 
-@kernel
-def _rop(setup: Setup, colors: Any, draw: Draw, tile: Tile, kept: int, column: int, line: int) -> Any:
-    """Write survivors in order; returns the writes, and the most that one pixel had."""
-    writes = longest = 0
-    for lane in range(kept):
-        p = tile.pixel[lane]
-        if draw.depth:
-            depth, old = tile.mask[lane], tile.depth[p]
-            if depth > old or (depth == old and not draw.later_wins):
-                continue
-            tile.depth[p] = depth
-        _write(setup, colors, draw, tile, lane, column + 7 - (p & 7), line + (p >> 3))
-        tile.chain[p] += 1
-        writes += 1
-        longest = max(longest, tile.chain[p])
-    for lane in range(kept):
-        tile.chain[tile.pixel[lane]] = 0
-    if draw.later_wins or not (draw.depth or draw.blend):
-        longest = min(longest, 1)  # one write each; the last lane wins
-    return writes, longest
+@kernel(lent=True)
+def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, line: int, row: Any) -> None:
+    """Take up to 32 fragments in order.
+
+    The original first tests all against the depths before the round, and then those that pass against each other; one
+    test in order writes the same.
+    """
+    state, n, kept, writes, longest, hit = tile.state, 0, 0, 0, 0, np.uint64(0)
+    head, tail, records = state[HEAD], state[TAIL], setup.planes
+    queued = min(tail - head, WARP)
+    while n < WARP and head < tail:
+        slot, mask = tile.slots[head], tile.masks[head]
+        zx, zy, zb = np.int64(records[slot, 0]), np.int64(records[slot, 1]), np.int64(records[slot, 2])
+        while n < WARP and mask != np.uint64(0):
+            p = lowest_bit(mask)
+            bit = mask & (~mask + np.uint64(1))
+            mask ^= bit
+            x, y = column + 7 - (p & 7), line + (p >> 3)
+            depth = (zx * x + zy * y + zb) & _LOW
+            if row is not None:
+                tile.slot[n] = slot
+                if hit & bit == np.uint64(0):
+                    tile.before[p], tile.chain[p] = tile.depth[p], 0
+                    hit |= bit
+                passes = not draw.depth or depth < tile.before[p] + draw.later_wins
+                tile.pixel[kept] = slot
+                kept += passes
+            n += 1
+            written = _fragment(setup, colors, draw, tile, slot, p, depth, x, y)
+            if row is not None:
+                writes += written
+                tile.chain[p] += passes if draw.later_wins else written
+                longest = max(longest, tile.chain[p])
+        tile.masks[head] = mask
+        head += mask == np.uint64(0)
+    state[FRAGMENTS] -= n
+    state[HEAD] = head
+    if row is not None:
+        row[FineRasterEvent.TAG_LANES] += queued
+        _count_round(setup, draw, tile, n, kept, writes, longest, row)
 
 
-@kernel
-def _conflicts(tile: Tile, kept: int) -> Any:
-    """Most survivors at one pixel, less one: the passes that a shared atomic takes again."""
-    most = 0
-    for lane in range(kept):
-        tile.chain[tile.pixel[lane]] += 1
-        most = max(most, tile.chain[tile.pixel[lane]])
-    for lane in range(kept):
-        tile.chain[tile.pixel[lane]] = 0
-    return max(most - 1, 0)
-
-
-@kernel
-def count_reads(setup: Setup, draw: Draw, tile: Tile, n: int, words: int, row: Any) -> None:
-    """Count 16-byte reads of data records by n lanes, one for each of the ``words`` (bit k: bytes 16 * k on)."""
-    for part in range(4):
-        if (words >> part) & 1:
-            for lane in range(n):
-                tile.addresses[lane] = tile.slot[lane] * setup.planes.shape[1] * _DATA_BYTES + 16 * part
-            count_gather(tile, n, 16, draw, row)
-
-
-@kernel
+@kernel(lent=True)
 def _count_round(setup: Setup, draw: Draw, tile: Tile, n: int, kept: int, writes: int, longest: Any, row: Any) -> None:
+    """Count a round of n fragments; ``tile.slot`` holds their slots, ``tile.pixel`` those of the ``kept``.
+
+    ``longest`` is the most writes of a pixel, or, where later ones win by atomics, the most fragments that try.
+    """
+    if draw.depth:
+        count_reads(setup, draw, tile.slot, tile.addresses, n, 1, row)
+    row[FineRasterEvent.TAG_WARPS] += 1
     row[FineRasterEvent.FRAGMENT_ROUNDS] += 1
     row[FineRasterEvent.FRAGMENT_LANES] += n
     row[FineRasterEvent.Z_KILLS] += n - kept
     row[FineRasterEvent.SAMPLE_HITS] += n
     if kept == 0:
         return
+    steps = longest if draw.depth or draw.blend else min(longest, 1)
+    if draw.later_wins:
+        steps = min(writes, 1)  # one write each; the last lane wins
+        row[FineRasterEvent.SHARED_ATOMIC] += 2
+        row[FineRasterEvent.BANK_REPLAYS] += 2 * (longest - 1)
+    else:
+        count_reads(setup, draw, tile.pixel, tile.addresses, kept, 3 if draw.interpolate else 1, row)
     row[FineRasterEvent.SHADE_ROUNDS] += 1
     row[FineRasterEvent.SHADE_LANES] += kept
-    row[FineRasterEvent.ROP_STEPS] += longest
+    row[FineRasterEvent.ROP_STEPS] += steps
     row[FineRasterEvent.ROP_LANES] += writes
     row[FineRasterEvent.BLEND_LANES] += kept
-    row[FineRasterEvent.BLEND_ROUND_LANES] += kept * longest
-    if draw.later_wins:
-        row[FineRasterEvent.SHARED_ATOMIC] += 2
-        row[FineRasterEvent.BANK_REPLAYS] += 2 * _conflicts(tile, kept)
-    else:
-        count_reads(setup, draw, tile, kept, np.int64(0b1110 if draw.interpolate else 0b1000), row)
+    row[FineRasterEvent.BLEND_ROUND_LANES] += kept * steps
 
 
-@kernel
+@kernel(lent=True)
 def draw_tile_single(
     setup: Setup, entries: Any, colors: Any, draw: Draw, tile: Tile, left: int, bottom: int, row: Any
 ) -> None:
     """Draw the list of one tile into ``tile``; ``row`` holds its counters or is None."""
     state = tile.state
     column, line = (left + draw.half_width) >> 4, (bottom + draw.half_height) >> 4
-    state[UPDATE] = 1 if tile.depth[:PIXELS].min() < state[ZMAX] else 0
+    for p in range(PIXELS):
+        state[UPDATE] |= tile.depth[p] < state[ZMAX]
     while True:
         if state[FRAGMENTS] < 32 and state[NEXT] < state[END]:
             if draw.depth:
@@ -140,13 +144,4 @@ def draw_tile_single(
             refill(setup, entries, draw, tile, left, bottom, row)
         if state[FRAGMENTS] == 0:
             return
-        queued = min(state[TAIL] - state[HEAD], 32)
-        n = take(tile)
-        if row is not None and draw.depth:
-            count_reads(setup, draw, tile, n, np.int64(0b0001), row)
-        kept = _depth_test(setup, draw, tile, n, column, line) if draw.depth else n
-        writes, longest = _rop(setup, colors, draw, tile, kept, column, line)
-        if row is not None:
-            row[FineRasterEvent.TAG_WARPS] += 1
-            row[FineRasterEvent.TAG_LANES] += queued
-            _count_round(setup, draw, tile, n, kept, writes, longest, row)
+        _draw_round(setup, colors, draw, tile, column, line, row)

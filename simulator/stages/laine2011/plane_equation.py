@@ -10,14 +10,14 @@ from tilestamp.simulator.stages.laine2011.exact import biased_exponent, float_bi
 _LOW = 0xFFFFFFFF
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def reciprocal_area(area: int) -> Any:
     """1 / area as a 24-bit mantissa and a right shift."""
     bits = float_bits(np.float32(1) / np.float32(area))
     return (bits & 0x7FFFFF) | 0x800000, 150 - (bits >> 23)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def plane_equation(
     u0: Any,
     u1: Any,

@@ -48,19 +48,19 @@ class Corner(NamedTuple):
     v: np.float32
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def snapped(x: Any, y: Any, inverse_w: Any, view: View) -> Any:
     """Project a clip position to the screen and round it to 1/16 pixel."""
     return round_to_int32((x * inverse_w) * view.scale_x), round_to_int32((y * inverse_w) * view.scale_y)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def depth_at(z: Any, inverse_w: Any) -> Any:
     """Depth of a clip position, float32 in depth units."""
     return fma(z * _DEPTH_SCALE, inverse_w, _DEPTH_BASE)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     """Make a corner of a clip position."""
     inverse = np.float32(1) / w
@@ -68,14 +68,14 @@ def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     return Corner(sx, sy, inverse, depth_at(z, inverse), w, u, v)
 
 
-@kernel
+@kernel(lent=True)
 def _holds_site(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, x: int, y: int, sign: int) -> Any:
     ax, bx, cx, ay, by, cy = ax - x, bx - x, cx - x, ay - y, by - y, cy - y
     ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
 
 
-@kernel
+@kernel(lent=True)
 def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View, sign: int) -> Any:
     """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
     q = SUBPIXELS >> view.log_samples
@@ -93,7 +93,7 @@ def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view:
     return not _holds_site(ax, ay, bx, by, cx, cy, high_x - x, high_y - y, sign), 2
 
 
-@kernel
+@kernel(lent=True)
 def cull(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View) -> Any:
     """Outcome of the culls that follow snapping, twice the area, and the sample sites that were looked at.
 
@@ -106,7 +106,7 @@ def cull(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View) -> An
     return BETWEEN if between else KEPT, area, sites
 
 
-@kernel
+@kernel(lent=True)
 def _flips(a: Corner, b: Corner) -> Any:
     """How the coverage table is turned for the edge a -> b (bits: flip y, flip x, swap, complement)."""
     dx, dy = b.sx - a.sx, b.sy - a.sy
@@ -120,13 +120,13 @@ def _flips(a: Corner, b: Corner) -> Any:
     return flips
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _lesser(a: Any, b: Any) -> Any:
     """Minimum that ignores NaN, as CUDA's does."""
     return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
     headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)
@@ -139,7 +139,7 @@ def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc
     misc[slot] = np.uint32(word)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def store_depth_plane(
     a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
 ) -> None:
@@ -156,7 +156,7 @@ def store_depth_plane(
         planes[slot, 3] = np.uint32(min(slope << (s - 1), _LOW))
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _store_plane(
     u0: Any,
     u1: Any,
@@ -178,7 +178,7 @@ def _store_plane(
     planes[slot, at], planes[slot, at + 1], planes[slot, at + 2] = np.uint32(x), np.uint32(y), np.uint32(base)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def store_attribute_planes(
     a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
 ) -> None:

@@ -50,7 +50,7 @@ SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64
 _PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
 
 
-@kernel
+@kernel(lent=True)
 def _setup_range(
     begin: int,
     end: int,

@@ -89,7 +89,7 @@ def new_counting() -> Any:
     )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def count_clipped(counting: Counting, bit: int, kept: int, fan: int, steps: Any) -> None:
     """Note a clipped lane."""
     lanes, most, total = counting.lanes, counting.most, counting.total
@@ -101,12 +101,12 @@ def count_clipped(counting: Counting, bit: int, kept: int, fan: int, steps: Any)
         total[i] += value
 
 
-@kernel
+@kernel(lent=True)
 def _lanes(mask: Any) -> Any:
     return popcount(np.uint64(mask))
 
 
-@kernel
+@kernel(lent=True)
 def _groups(mask: Any, size: int) -> Any:
     """Aligned groups of ``size`` lanes, a power of two, with a lane in the mask."""
     step = 1
@@ -116,7 +116,7 @@ def _groups(mask: Any, size: int) -> Any:
     return _lanes(mask & (0xFFFFFFFF // ((1 << size) - 1)))
 
 
-@kernel
+@kernel(lent=True)
 def _note(seen: Any, mark: int, key: int, load: int) -> Any:
     """Note that a load touches a segment; returns the loads of the block that had touched it before, a bit each."""
     at, wanted = key & (_SEEN - 1), mark << 32 | key
@@ -130,7 +130,7 @@ def _note(seen: Any, mark: int, key: int, load: int) -> Any:
     return before
 
 
-@kernel
+@kernel(lent=True)
 def count_vertices(
     row: Any, vertices: Any, counting: Counting, triangles: Any, t0: int, n: int, block: int, simt: Simt
 ) -> None:
@@ -162,7 +162,7 @@ def count_vertices(
     row[_E.LOAD_BYTES] += count * segment
 
 
-@kernel
+@kernel(lent=True)
 def _count_lanes(row: Any, counting: Counting, n: int) -> None:
     """Count the branches that the lanes of a warp take."""
     lanes, most, total = counting.lanes, counting.most, counting.total
@@ -208,7 +208,7 @@ def _count_lanes(row: Any, counting: Counting, n: int) -> None:
     row[_E.STORE_BYTES] += SECTOR_BYTES * own
 
 
-@kernel
+@kernel(lent=True)
 def count_warp(row: Any, counting: Counting, n: int, view: View, out: Setup, simt: Simt) -> None:
     """Count a warp of n triangles, its vertices apart, and forget its lanes.
 

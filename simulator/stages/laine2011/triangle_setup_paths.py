@@ -61,7 +61,7 @@ def new_scratch() -> Any:
     )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def _store(
     a: Corner, b: Corner, c: Corner, area: int, view: View, out: Setup, slot: int, t: int, triangles: Any
 ) -> None:
@@ -82,7 +82,7 @@ def _store(
         out.planes[slot, 13 + k] = np.uint32(triangles[t, k])
 
 
-@kernel
+@kernel(lent=True)
 def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
     u, v = polygon[i, 0], polygon[i, 1]
     x, y = between(clip[0, 0], clip[1, 0], clip[2, 0], u, v), between(clip[0, 1], clip[1, 1], clip[2, 1], u, v)
@@ -90,7 +90,7 @@ def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
     return snap(x, y, z, w, u, v, view)
 
 
-@kernel
+@kernel(lent=True)
 def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
     """Count the surviving triangles of a clipped polygon; from ``slot`` on, where not negative, write them."""
     kept = 0
@@ -108,7 +108,7 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
     return kept
 
 
-@kernel
+@kernel(lent=True)
 def whole_outcome(screen: Screen, triangles: Any, t: int, view: View) -> Any:
     """Outcome of a triangle if it needs no clipping (``CLIPPED`` if it does), its area, and the sites looked at."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -128,14 +128,14 @@ def whole_outcome(screen: Screen, triangles: Any, t: int, view: View) -> Any:
     return cull(ax, ay, bx, by, cx, cy, view)
 
 
-@kernel
+@kernel(lent=True)
 def _corner(screen: Screen, positions: Any, i: int, u: Any, v: Any) -> Any:
     """Make a corner of an input vertex."""
     place, ratio = screen.places[i], screen.ratios[i]
     return Corner(np.int64(place[0]), np.int64(place[1]), ratio[0], ratio[1], positions[i, 3], u, v)
 
 
-@kernel
+@kernel(lent=True)
 def store_whole(screen: Screen, positions: Any, triangles: Any, t: int, area: int, view: View, out: Setup) -> None:
     """Write a triangle that needs no clipping to its own slot."""
     zero, one = np.float32(0), np.float32(1)
@@ -145,7 +145,7 @@ def store_whole(screen: Screen, positions: Any, triangles: Any, t: int, area: in
     _store(a, b, c, area, view, out, t, t, triangles)
 
 
-@kernel
+@kernel(lent=True)
 def clip_and_store(scratch: Scratch, positions: Any, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
     """Clip one triangle and write what survives (a single survivor to the own slot); returns survivors and fan size."""
     clip, polygon = scratch.clip, scratch.polygon
