@@ -234,7 +234,7 @@ def test_an_outdated_result_is_said_to_be_so(written):
     changed(written, code="0" * 16)
     (row,), advice, _ = rebuild(written)
     assert row.outdated == "the code has changed"
-    assert advice == [f"Out of date (the code has changed); to run again: tilestamp reproduce {NAME}"]
+    assert advice == [f"1 result is out of date (the code has changed); run again where named: {NAME}"]
 
 
 def test_what_to_do_for_the_real_models_is_said(tmp_path):

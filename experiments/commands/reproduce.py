@@ -108,7 +108,7 @@ def _print_end(output: Path, page: Path, valid: int, left: set[str]) -> None:
     if valid:
         sys.stdout.write(f"{valid} results were valid and not run again (--again runs them)\n")
     if left:
-        sys.stdout.write(f"Not run, for their time (name them, or --all): {', '.join(sorted(left))}\n")
+        sys.stdout.write(f"{len(left)} experiments take longer and were not run (name them, or --all)\n")
     sys.stdout.write(f"CSV, manifests and plots: {output}; the page: {page}\n")
 
 

@@ -80,7 +80,7 @@ def run(progress: Progress) -> Result:
 def _answer(ours: "pd.DataFrame") -> str:
     """Each method's cost, and its distance from the full run."""
     said = [
-        f"{row.method} {row.cpu_seconds:.2f} s ({row.error_against_full:.1%} off)"
+        f"{row.method} {row.cpu_seconds:.2f} s ({row.error_against_full:.2%} off)"
         for row in ours.itertuples()
         if not isnan(row.error_against_full)
     ]

@@ -119,7 +119,9 @@ def _answer(table: "pd.DataFrame") -> str:
         f"{rows.share_of_full.median():.0%} at {rows.milliseconds_error.mean():.2%} (asked: {asked:.0%})"
         for asked, rows in sampled
     ]
-    return f"Median share of a full run, and mean error of a frame's time: {'; '.join(said)}." if said else ""
+    if not said:
+        return f"None here: no frame of {table.scene.nunique()} scenes takes long enough for a sample to save anything."
+    return f"Median share of a full run, and mean error of a frame's time: {'; '.join(said)}."
 
 
 def _rows(case: Case, scene: Scene) -> list[dict[str, Any]]:

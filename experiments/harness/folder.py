@@ -18,6 +18,7 @@ from tilestamp.simulator.scenes.search_path import SCENES_VARIABLE
 
 SCOREBOARD = "scoreboard"
 BOUNDARIES = "boundaries.csv"  # a table of results of the stability atlas
+TOLD = 3  # results out of date that are named
 Record = dict[str, Any]
 
 
@@ -60,10 +61,12 @@ def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
         )
     lacking = [(r["experiment"], " ".join(r["warnings"])) for r in records if r["state"] == NOT_RUN]
     said += [f"{name} was not run: {why.removeprefix('not run: ')}" for name, why in lacking]
-    old = [row for row in rows if row.outdated and row.state != NOT_RUN]
+    old = [row.experiment for row in rows if row.outdated and row.state != NOT_RUN]
     if old:
-        names = " ".join(row.experiment for row in old)
-        said.append(f"Out of date ({old[0].outdated}); to run again: tilestamp reproduce {names}")
+        why = next(row.outdated for row in rows if row.experiment == old[0])
+        number = "1 result is" if len(old) == 1 else f"{len(old)} results are"
+        more = f" and {len(old) - TOLD} more" if len(old) > TOLD else ""
+        said.append(f"{number} out of date ({why}); run again where named: {', '.join(old[:TOLD])}{more}")
     return said
 
 

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Scale = Literal["log", "linear", "integer"]
-TOLD = 2  # boundaries that an answer names
 TOLERANCE = {"log": 0.01, "linear": 0.01, "integer": 1.0}  # ratio - 1; share of the range; units
 
 
@@ -155,13 +154,13 @@ def atlas_result(
 
 
 def _answer(boundaries: Sequence[Boundary]) -> str:
-    """How many break, and where the first ones do."""
+    """How many break, and where the first of them does."""
     broken = [boundary for boundary in boundaries if boundary.breaks is not None]
     if not broken:
         return f"None of {len(boundaries)} breaks within what was tried."
-    said = [f"{boundary.method} from {_where(boundary)} ({boundary.wrong})" for boundary in broken[:TOLD]]
-    more = f"; and {len(broken) - TOLD} more" if len(broken) > TOLD else ""
-    return f"{len(broken)} of {len(boundaries)} break: {'; '.join(said)}{more}."
+    first = broken[0]
+    wrong = first.wrong.partition(":")[0].partition(" (")[0]
+    return f"{len(broken)} of {len(boundaries)} break; {first.method} from {_where(first)} on: {wrong}."
 
 
 def _where(boundary: Boundary) -> str:
