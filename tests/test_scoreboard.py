@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from tilestamp.experiments.commands import scoreboard as printed
+from tilestamp.experiments.commands import tables
+from tilestamp.experiments.commands.scoreboard import print_scoreboard
 from tilestamp.experiments.harness.folder import rebuild
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.scoreboard import Errors, Row, Words, flat, row_of, total
@@ -122,8 +123,8 @@ def shown(width, *rows, advice=()):
     """What a terminal of some columns shows."""
     screen = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(printed, "Console", lambda **_: Console(file=screen, width=width, force_terminal=True))
-        printed.print_scoreboard(rows, advice)
+        patch.setattr(tables, "_console", lambda: Console(file=screen, width=width, force_terminal=True))
+        print_scoreboard(rows, advice)
     return re.sub(r"\x1b\[[0-9;]*m", "", screen.getvalue())
 
 

@@ -78,7 +78,7 @@ def digest_of(monkeypatch):
         monkeypatch.setattr(
             validity, "_of_file", lambda path: b"edited" if place and path.as_posix().endswith(place) else plain(path)
         )
-        return code_digest(experiment)
+        return code_digest.__wrapped__(experiment)
 
     yield digest
     validity._floors.cache_clear()

@@ -14,9 +14,9 @@ from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.harness.folder import rebuild, stored
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
 from tilestamp.experiments.harness.record import result_of
-from tilestamp.experiments.harness.registry import experiment_names, select
+from tilestamp.experiments.harness.registry import experiment_names, question, select
 from tilestamp.experiments.harness.result import Outcome, Result
-from tilestamp.experiments.harness.texts import COLUMNS, PRINTED, averages, cell_texts, fitted_numbers
+from tilestamp.experiments.harness.texts import COLUMNS, PRINTED, answered, averages, cell_texts, fitted_numbers
 from tilestamp.experiments.harness.validity import outdated
 from tilestamp.models.errors import TilestampError
 
@@ -118,9 +118,10 @@ def _print_result(result: Result) -> None:
     for warning in result.warnings:
         sys.stdout.write(f"! {warning}\n")
     title = f"{result.title} [{result.name}]"
+    sys.stdout.write(f"{question(result.experiment)} {answered(result)}".strip() + "\n")
     if result.cells:
         rows = [cell_texts(cell)[:PRINTED] for cell in result.cells]
-        styles = ["dim" if c.status == "fitted" else "bold red" if c.missed else "" for c in result.cells]
+        styles = ["dim" if c.status in {"fitted", "stand-in"} else "bold red" if c.missed else "" for c in result.cells]
         print_table(title, COLUMNS[:PRINTED], rows, styles, keys=2)
     else:
         sys.stdout.write(f"{title}\n")

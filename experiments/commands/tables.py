@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod
+    from rich.table import Table
 
 WIDE = 240  # columns of a table that goes to a file or a pipe
+UNLIMITED = 1000  # columns in which any table has room
 GAP = 2  # blanks between two columns
 
 
@@ -72,6 +74,14 @@ def print_lines(*lines: str, style: str = "") -> None:
     console = _console()
     for line in lines:
         console.print(Text(line, style=style), soft_wrap=not console.is_terminal)
+
+
+def print_first_that_fits(*tables: "Table") -> None:
+    """Print the first of several layouts that is no wider than the terminal; the last one if none is."""
+    console = _console()
+    wide = console.options.update(width=UNLIMITED)
+    fitting = [table for table in tables if console.measure(table, options=wide).maximum <= console.width]
+    console.print((fitting or tables[-1:])[0])
 
 
 def _parts(lines: Sequence[Sequence[str]], keys: int, together: int, width: int) -> list[list[int]]:

@@ -64,9 +64,9 @@ def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
     old = [row.experiment for row in rows if row.outdated and row.state != NOT_RUN]
     if old:
         why = next(row.outdated for row in rows if row.experiment == old[0])
-        number = "1 result is" if len(old) == 1 else f"{len(old)} results are"
+        count = "1 result is" if len(old) == 1 else f"{len(old)} results are"
         more = f" and {len(old) - TOLD} more" if len(old) > TOLD else ""
-        said.append(f"{number} out of date ({why}); run again where named: {', '.join(old[:TOLD])}{more}")
+        said.append(f"{count} out of date ({why}); run again where named: {', '.join(old[:TOLD])}{more}")
     return said
 
 

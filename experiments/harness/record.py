@@ -10,7 +10,7 @@ import msgspec
 from tilestamp.experiments.harness.registry import describe_folder, question
 from tilestamp.experiments.harness.result import Cell, Kind, Result
 from tilestamp.experiments.harness.scoreboard import Row, row_of
-from tilestamp.experiments.harness.texts import averages, disagreements, fitted_numbers, score_text
+from tilestamp.experiments.harness.texts import answered, averages, disagreements, fitted_numbers
 
 FORMAT = 1
 NOT_RUN = "not run"
@@ -20,7 +20,14 @@ OF_A_CELL = [field.name for field in fields(Cell)]
 
 def record_of(result: Result, folder: Path, stand_ins: list[str], seconds: float) -> dict[str, Any]:
     """All that is said about a result whose plots and tables lie in ``folder``."""
-    row = scored(result, folder.name, seconds)
+    row = row_of(
+        result,
+        name=folder.name,
+        question=question(result.experiment),
+        answer=answered(result),
+        state=NOT_RUN if result.warnings and not result.cells else "done",
+        seconds=seconds,
+    )
     return {
         "format": FORMAT,
         "experiment": result.experiment,
@@ -43,19 +50,6 @@ def record_of(result: Result, folder: Path, stand_ins: list[str], seconds: float
         "scoreboard": asdict(row),
         "cells": cell_records(result),
     }
-
-
-def scored(result: Result, name: str = "", seconds: float = 0.0) -> Row:
-    """The row of a result on the scoreboard, with its question and its answer."""
-    said = score_text(row_of(result))
-    return row_of(
-        result,
-        name=name,
-        question=question(result.experiment),
-        answer=result.answer or (f"{said[0].upper()}{said[1:]}." if said else ""),
-        state=NOT_RUN if result.warnings and not result.cells else "done",
-        seconds=seconds,
-    )
 
 
 def _figure(name: str, folder: Path) -> dict[str, str | None]:

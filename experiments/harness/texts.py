@@ -3,7 +3,7 @@
 import math
 
 from tilestamp.experiments.harness.result import Cell, Kind, Result, Status
-from tilestamp.experiments.harness.scoreboard import Errors, Row, errors_of
+from tilestamp.experiments.harness.scoreboard import Errors, Row, errors_of, row_of
 
 COLUMNS = ("row", "column", "unit", "published", "ours", "error", "status", "aim", "share", "fitted by")
 PRINTED = COLUMNS.index("share") + 1  # columns of the printed table: the numbers of all cells are named below it
@@ -64,6 +64,12 @@ def score_text(row: Row) -> str:
     numbers = {"fitted": row.fitted, "partly fitted": row.partly_fitted, "of stand-ins": row.stand_ins}
     cells = [f"{number:,} {what}" for what, number in numbers.items() if number]
     return "; ".join([*parts, *([f"cells {', '.join(cells)}"] if cells else [])])
+
+
+def answered(result: Result) -> str:
+    """What a result says to its question: its own sentence, or how far its cells are off."""
+    said = score_text(row_of(result))
+    return result.answer or (f"{said[0].upper()}{said[1:]}." if said else "")
 
 
 def disagreements(result: Result) -> list[str]:

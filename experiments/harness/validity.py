@@ -38,16 +38,21 @@ REASONS = {"code": "the code has changed", "versions": "other versions of {}", "
 
 def made_from(experiment: str) -> dict[str, Any]:
     """What decides a result now, but for its scenes."""
-    packages = {name: version(name) for name in PACKAGES}
     variables = {name: value for name, value in os.environ.items() if name.startswith("TILESTAMP_")}
     variables.pop(SCENES_VARIABLE, None)
     return {
         "code": code_digest(experiment),
-        "versions": {"python": platform.python_version()} | packages,
+        "versions": _versions(),
         "variables": dict(sorted(variables.items())),
     }
 
 
+@cache
+def _versions() -> dict[str, str]:
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+
+
+@cache
 def code_digest(experiment: str) -> str:
     """Digest of the files that decide what an experiment gives, 16 hexadecimal digits."""
     module = f"tilestamp.experiments.{experiment.replace('/', '.')}"
