@@ -30,7 +30,7 @@ class Cell:
     status : {"predicted", "partly fitted", "fitted", "stand-in", "reproduced", "reported"}
         An experiment says that there is no aim (``reported``), that what is published was computed like ours and not
         measured (``reproduced``), or that another scene stands in for the published one (``stand-in``). How fitted any
-        other cell is, is computed (``tilestamp.experiments.harness.fit``), and so is whether its frame shows the stand-in
+        other cell is, is computed (``tilestamp.experiments.harness.fit``); so is whether its frame shows the stand-in
         for a model that is not here.
     aim : float or None
         Relative error aimed at.
