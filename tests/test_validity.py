@@ -239,7 +239,7 @@ def test_an_outdated_result_is_said_to_be_so(written):
 
 def test_what_to_do_for_the_real_models_is_said(tmp_path):
     drawn = replace(RESULT, cells=[replace(CELL, status="stand-in")])
-    write_result(drawn, tmp_path, Making(used={"stand-ins": {"killeroo": set()}}, made_from=made_from(NAME)))
+    write_result(drawn, tmp_path, Making(used={"stand-ins": {"killeroo": {"killeroo.bpt"}}}, made_from=made_from(NAME)))
     (advice,) = rebuild(tmp_path)[1]
     assert advice.startswith("1 cell of stand-ins")
     assert "put killeroo.bpt into a folder, name that folder in TILESTAMP_SCENES" in advice

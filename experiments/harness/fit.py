@@ -26,7 +26,7 @@ from tilestamp.simulator.scenes.library import STAND_INS
 
 PREDICTED, FITTED_FROM = 0.1, 0.9
 WORK_OF_A_TIME = 0.5  # part of a time that a chosen input settles
-STATED = {"reported", "reproduced"}  # by an experiment itself
+STATED = {"reported", "reproduced", "stand-in"}  # by an experiment itself
 NAMED = 0.005  # smaller parts are not named
 Parts = dict[str, float]
 """Of a change of a number, by its name, the part that a cell follows."""

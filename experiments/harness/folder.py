@@ -51,9 +51,9 @@ def stored(output: Path) -> list[Record]:
 def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
     """What to do to get the real models, what was not run, and what is out of date."""
     said = []
-    absent = sorted({name for record in records for name in record["stand_ins"]})
+    absent = sorted({file for record in records for file in record["stand_ins"].values()})
     if absent:
-        files = " and ".join(f"{name}.bpt" for name in absent)
+        files = ", ".join(absent)
         number = sum(row.stand_ins for row in rows)
         said.append(
             f"{number} {'cell' if number == 1 else 'cells'} of stand-ins say nothing of the model: put {files} into a "

@@ -18,7 +18,7 @@ KINDS: tuple[Kind, ...] = ("time", "count")  # of cells that have an error
 OF_A_CELL = [field.name for field in fields(Cell)]
 
 
-def record_of(result: Result, folder: Path, stand_ins: list[str], seconds: float) -> dict[str, Any]:
+def record_of(result: Result, folder: Path, stand_ins: dict[str, str], seconds: float) -> dict[str, Any]:
     """All that is said about a result whose plots and tables lie in ``folder``."""
     row = row_of(
         result,

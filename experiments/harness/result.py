@@ -28,9 +28,10 @@ class Cell:
         As printed; an order or a name where that is what the source says; None where it says nothing.
     ours : float or str
     status : {"predicted", "partly fitted", "fitted", "stand-in", "reproduced", "reported"}
-        An experiment says that there is no aim (``reported``) or that what is published was computed like ours and not
-        measured (``reproduced``). How fitted any other cell is, is computed (``tilestamp.experiments.harness.fit``);
-        so is whether its frame shows the ``stand-in`` for a model that is not here.
+        An experiment says that there is no aim (``reported``), that what is published was computed like ours and not
+        measured (``reproduced``), or that another scene stands in for the published one (``stand-in``). How fitted any
+        other cell is, is computed (``tilestamp.experiments.harness.fit``); so is whether its frame shows the stand-in
+        for a model that is not here.
     aim : float or None
         Relative error aimed at.
     frame : str

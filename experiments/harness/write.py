@@ -69,7 +69,9 @@ def write_result(result: Result, output: Path, making: Making) -> Path:
             table.to_csv(made / f"{name}.csv", index=False)
         for figure in result.figures:
             draw_figure(figure, result, made / f"{figure.name}.png")
-        write_json(made / RECORD, record_of(result, made, sorted(making.used.get(STAND_INS, {})), making.seconds))
+        write_json(
+            made / RECORD, record_of(result, made, used_manifest(making.used).get(STAND_INS, {}), making.seconds)
+        )
         write_json(made / MANIFEST, _manifest(result, making))
         shutil.rmtree(target, ignore_errors=True)
         made.rename(target)

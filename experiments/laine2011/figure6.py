@@ -103,7 +103,7 @@ def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Ce
                 "us",
                 published=1e3 * asked,
                 ours=1e3 * found,
-                status="reported",
+                status="reported" if name == FULL else "stand-in",
                 aim=AIM,
             )
         )

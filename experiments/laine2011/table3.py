@@ -11,8 +11,10 @@ from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
+from tilestamp.models.used import note
 from tilestamp.reports.plots import paired_bars
 from tilestamp.simulator.scenes import Scene, load_scene
+from tilestamp.simulator.scenes.library import STAND_INS
 from tilestamp.simulator.scenes.search_path import find_scene
 from tilestamp.simulator.simulation import simulate
 
@@ -58,7 +60,7 @@ def run(progress: Progress) -> Result:
         )
     progress(f"laine2011/table3: {name}")
     made = simulate(load_buddha(name), "cudaraster", MACHINE, width=WIDTH, height=HEIGHT, camera=CAMERA)
-    cells = counter_cells(made, "predicted" if name == FULL else "reported")
+    cells = counter_cells(made, "predicted" if name == FULL else "stand-in")
     return Result(
         name="laine2011-table3",
         title=f"Table 3: {name}, camera 0, 1024x768, GTX 480",
@@ -87,6 +89,7 @@ def load_buddha(name: str) -> Scene:
     scene = load_scene(name)
     if name == FULL or scene.mesh is None:
         return scene
+    note(STAND_INS, FULL, f"{FULL}.ply")
     positions = scene.mesh.positions.copy()
     positions[:, :3] = positions[:, :3] * np.float32(REDUCED_SCALE) + np.array(REDUCED_MOVE, np.float32)
     return replace(scene, mesh=replace(scene.mesh, positions=positions))

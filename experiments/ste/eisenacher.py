@@ -81,8 +81,8 @@ def run(progress: Callable[[str], None]) -> Result:
 def _answer(rows: list[dict[str, Any]]) -> str:
     """The range over the scenes, and the area that would give what is quoted."""
     efficiencies = [row["ste"] for row in rows]
-    there = f"{min(efficiencies):.2f} to {max(efficiencies):.2f} %; " if rows else ""
-    return f"{there}{QUOTED:g} %, as quoted, take squares of {_area_at(QUOTED / 100):.2f} pixels."
+    there = f"{min(efficiencies):.2f} to {max(efficiencies):.2f} %, by scene and bound; " if rows else ""
+    return f"{there}the quoted {QUOTED:g} % need squares of {_area_at(QUOTED / 100):.2f} pixels."
 
 
 def _swept(area: float) -> dict[str, float]:

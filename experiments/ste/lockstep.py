@@ -43,12 +43,19 @@ def run(progress: Callable[[str], None]) -> Result:
         title="Lanes at work across polygons",
         source="Luong 2010 (Stanford honours thesis), abstract: 65 % for LOCKSTEP, 85 % for REPACK",
         cells=[_cell(row) for row in rows],
-        answer=_notes(table)[0],
+        answer=_answer(table),
         figures=[Figure("utilisation", lambda path: _plot(table, path))],
         notes=_notes(table),
         warnings=[f"{name} is not on the scene path: its stand-in was drawn" for name in stand_ins],
         tables={"runs": table},
     )
+
+
+def _answer(table: pd.DataFrame) -> str:
+    """Means at the width that the published figures stand beside."""
+    means = table[table.lanes == COMPARED].groupby("algorithm", sort=False)["utilisation"].mean()
+    said = [f"{means[label]:.0f} % by {label} (published: {share:g})" for label, share in ALGORITHMS.values()]
+    return f"On {COMPARED} lanes {' and '.join(said)}."
 
 
 def utilisation(polygons: Micropolygons, packing: Packing, lanes: int, width: int, height: int) -> float:

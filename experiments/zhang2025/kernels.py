@@ -77,7 +77,7 @@ def run(progress: Callable[[str], None]) -> Result:
 
 def _answer(cells: list[Cell], machine: str) -> str:
     """All kernels together, on the machine that fits better."""
-    sums = [c for c in cells if c.row == "sum" and c.column.startswith(machine)]
+    sums = [c for c in cells if c.row == "sum" and c.column.startswith(machine) and "saved" not in c.column]
     said = [f"{float(c.ours):,.0f} us {c.column.split()[-1]} ({float(c.published or 0):,.0f} published)" for c in sums]
     return f"On the {machine}, which fits better, all together {' and '.join(said)}."
 
