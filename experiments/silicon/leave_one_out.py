@@ -1,9 +1,10 @@
-"""One scene left out: what the fitted constants of CudaRaster and FreePipe are worth on a scene that they never saw.
+"""One scene left out: what fitted constants are worth on a scene that they never saw.
 
-The mixes are read from machine code; a few numbers in them are fitted (``cudaraster_mix.FITTED``, ``freepipe_mix``).
-Here each scene is left out in turn, the instructions of the fitted events are fitted anew to the others, and the scene
-is predicted with them; chains are fitted anew by one factor a kernel. Narrow screens only, unless
-``TILESTAMP_LEAVE_OUT_WIDTH`` says how wide.
+The mixes of CudaRaster and FreePipe are read from machine code; a few numbers in them are fitted
+(``cudaraster_mix.FITTED``, ``freepipe_mix``). Here each scene is left out in turn, the instructions of the fitted
+events are fitted anew to the others, and the scene is predicted with them; chains are fitted anew by one factor a
+kernel. Narrow screens only, unless ``TILESTAMP_LEAVE_OUT_WIDTH`` says how wide. Ru's tiled raster is another file's
+(``leave_one_out_tiled``).
 """
 
 import os
@@ -20,9 +21,11 @@ from tilestamp.experiments.calibration import cudaraster_mix, freepipe_mix
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.silicon.h200 import SOURCE
 from tilestamp.experiments.silicon.inputs import write_inputs
+from tilestamp.experiments.silicon.leave_one_out_tiled import tiled_cells
 from tilestamp.experiments.silicon.seen_scenes import SEEN, seen_scenes
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME_METRIC, warm_microseconds
 from tilestamp.experiments.validation.stored import CUDARASTER, FREEPIPE, cudaraster_works, freepipe_works, read
+from tilestamp.models.errors import MissingInputError
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.launch import Launch
@@ -71,6 +74,10 @@ def run(progress: Callable[[str], None]) -> Result:
                     cells.append(
                         Cell(label, f"{kernel} time", "us", published=row["us"], ours=_at(row, factor), aim=AIM_TIME)
                     )
+    try:
+        cells += tiled_cells(progress)
+    except MissingInputError as missing:
+        left_out.append(str(missing))
     return Result(
         name="silicon-leave_one_out",
         title="H200, one scene left out of the fit",
