@@ -79,7 +79,7 @@ def _head(results: Path, times: "pd.DataFrame") -> Iterator[str]:
 # How accurate the predictions are
 
 Everything here was computed from runs of `tilestamp reproduce` on machine `h200`, beside what was measured on an H200;
-[machine-model.md](machine-model.md) says how a time is made and what explains the errors. A scene is *seen* where some
+[time.md](time.md) says how a time is made, [machine-model.md](machine-model.md) what explains the errors. A scene is *seen* where some
 number was fitted to a cell of it (in that experiment), and *unseen* where none was. The form of the model was chosen
 with both in sight: no number was fitted to an unseen scene, but it is not blind. Ratios are predicted over measured.
 

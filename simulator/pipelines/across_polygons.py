@@ -1,4 +1,15 @@
-"""Across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009, without blur)."""
+"""Across polygons: one lane a micropolygon, each walking its own box (Fatahalian et al. 2009, without blur).
+
+Modelled
+--------
+- A lane a micropolygon that walks its box, in input order, sorted within the warp, or repacked as lanes fall idle.
+- The sort and the repacking, as instructions of the warp.
+
+Not modelled
+------------
+- Dicing and shading: micropolygons come as made (``edge``), and their rasterization with depth by atomics is counted.
+- Machine code: mixes are operations counted by hand, so its times compare algorithms and are no prediction of a GPU.
+"""
 
 from typing import Any, ClassVar
 

@@ -1,4 +1,19 @@
-"""Zhang 2025: sort-middle by bins, tiles and quads; trilinear textures; API order or order-independent transparency."""
+"""Zhang 2025: sort-middle by bins, tiles and quads; trilinear textures; API order or order-independent transparency.
+
+Modelled
+--------
+- Clears, nine kernels before and after their optimizations, bins, tiles and quads, hierarchical and early depth
+  tests.
+- Textures in rows or tiles, trilinear filtering, transparency in API order or by depth.
+- What the original gets wrong where it is asked for: lost fragments, holes of a stepped depth, rows beyond whole
+  blocks.
+
+Not modelled
+------------
+- More than 2048 pixels on a side.
+- The graph's parallel branches: ``zhang2025/graph`` prices them; a run's launches follow one another.
+- Kernels before their optimization on 9.0: they have the instructions of 8.6.
+"""
 
 from typing import Annotated, Any, Literal
 

@@ -1,4 +1,15 @@
-"""Bit mask: samples that a patch has hit are not tested again by its later micropolygons (Yao et al. 2012)."""
+"""Bit mask: samples that a patch has hit are not tested again by its later micropolygons (Yao et al. 2012).
+
+Modelled
+--------
+- The mask of each patch's box, reads of its words, tests of clear samples, writes at the end of a step.
+- What the mask gets wrong where a patch covers a sample twice, and two variants that do not (``facing``, ``depth``).
+
+Not modelled
+------------
+- Dicing and shading; the exact picture that the result is compared with is no part of the work.
+- Machine code: mixes are operations counted by hand.
+"""
 
 from typing import Annotated, Any, ClassVar
 

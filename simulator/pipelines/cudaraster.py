@@ -2,6 +2,20 @@
 
 Triangle setup culls and prepares, bin raster queues triangles by 128x128 pixels, coarse raster by 8x8, and fine
 raster draws each 8x8 tile in shared memory.
+
+Modelled
+--------
+- All four kernels of both releases to the bit: queues, segments, input order, clipping, snapping, pictures,
+  counters.
+- Batches, samples (1 to 8), four modes, and attempts that fail because a queue is too short (``first_frame``).
+- What nvdiffrast's copy of the parameters to local memory costs (``copy_parameters``).
+
+Not modelled
+------------
+- Vertex shading: vertices come in clip space; the transform is free.
+- Which block draws which bin or batch: they take turns. No picture depends on it, only which streams are longest.
+- Sizes above 2048 pixels, ranges, depth peeling and derivatives of nvdiffrast.
+- Copies between host and GPU.
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,18 @@
-"""FreePipe: one kernel, one thread a triangle, atomics on a frame buffer in DRAM (Liu et al. 2010)."""
+"""FreePipe: one kernel, one thread a triangle, atomics on a frame buffer in DRAM (Liu et al. 2010).
+
+Modelled
+--------
+- One thread a triangle with its box, rows and steps; lanes that wait for the longest of their warp.
+- Atomics with their conflicts, in one 64-bit or two 32-bit words; which fragment wins where depths are equal.
+- What a look at the pixel before the atomic saves (``early``).
+
+Not modelled
+------------
+- With ``early``: how old the values are that a warp reads. Warps run one after another here; a GPU's thousands at once
+  read older ones, and leave out fewer atomics.
+- Vertex and fragment programs of the original system: a fragment is a depth and a payload.
+- Order-independent blending by several kept layers.
+"""
 
 from typing import Annotated
 

@@ -1,4 +1,19 @@
-"""The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
+"""The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels.
+
+Modelled
+--------
+- Items that pass each unit: vertices fetched with reuse, primitives, culled ones, quads, depth tests, samples,
+  pixels.
+- Coverage at 8 sub-pixel bits, a guard band as wide as Direct3D 11's, four depth formats.
+- Bytes to and from DRAM for vertices, colour and depth.
+
+Not modelled
+------------
+- Tiles, compression of depth and colour, hierarchical depth tests: a unit is a rate in the machine file, and most
+  are assumed.
+- Programs of vertices and pixels: the units that run them are free.
+- Several units that take turns at being the bottleneck within a frame: the slowest one over the frame sets the time.
+"""
 
 from typing import Annotated
 

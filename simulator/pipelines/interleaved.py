@@ -1,4 +1,15 @@
-"""Interleaved: moving micropolygons placed at a tile's times and lens points, one by one (Fatahalian et al. 2009)."""
+"""Interleaved: moving micropolygons placed at a tile's times and lens points, one by one (Fatahalian et al. 2009).
+
+Modelled
+--------
+- Each polygon placed at every time and lens point of the pattern's tile, and the pixels that share each.
+- Motion on straight lines, circles of confusion of a thin lens.
+
+Not modelled
+------------
+- Dicing and shading: micropolygons come as made (``edge``).
+- Triangles have the price of quads. On an H200 the model is 1.7 to 3.2 times too fast (experiment ``ste/blur``).
+"""
 
 from typing import Annotated, Any, ClassVar
 

@@ -1,4 +1,17 @@
-"""Ru 2016: one thread a triangle, atomicMin on depth, an unprotected fragment write."""
+"""Ru 2016: one thread a triangle, atomicMin on depth, an unprotected fragment write.
+
+Modelled
+--------
+- One thread a triangle over its box, an atomicMin on depth, and the fragment written after it.
+- The race of those writes: warps walk in step, fragments of several warps land in an order drawn by a hash (``race``).
+
+Not modelled
+------------
+- When a real GPU's writes land: the places that the hash draws from are an assumption, so which pixels are wrong is
+  a sample.
+- Clipping: triangles with a corner behind the eye are left out, and counted.
+- The time of the host's waits between launches.
+"""
 
 from typing import Any
 

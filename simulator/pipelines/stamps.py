@@ -1,4 +1,15 @@
-"""Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009)."""
+"""Stamps: micropolygons one by one, n x n pixels tested at once (Pineda 1988; Fatahalian et al. 2009).
+
+Modelled
+--------
+- Stamps of 1 to 64 samples, coarse stamps before them, and both rules of which stamps a polygon touches.
+- Every lane that comes along for the ride in a stamp: the definition of sample test efficiency.
+
+Not modelled
+------------
+- Dicing and shading: micropolygons come as made (``edge``), and their rasterization with depth by atomics is counted.
+- Machine code: mixes are operations counted by hand, so its times compare algorithms and are no prediction of a GPU.
+"""
 
 from typing import Annotated, Any, ClassVar
 
