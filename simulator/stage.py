@@ -31,7 +31,7 @@ class StageResult(NamedTuple, Generic[T]):
 
     Parameters
     ----------
-    outputs
+    outputs : T
         What the stages behind it take.
     works : tuple of Work
         One for each kernel launch; none where nothing was counted.

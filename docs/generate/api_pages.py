@@ -1,9 +1,11 @@
 """The API reference: the public names, then a page for each folder of modules."""
 
+import inspect
 from pathlib import Path
 
+from texts import code, sections, table
+
 import tilestamp
-from texts import sections
 
 PACKAGE = Path(tilestamp.__file__).parent
 FLOORS = ("models", "simulator", "experiments", "reports")
@@ -12,14 +14,18 @@ FLOORS = ("models", "simulator", "experiments", "reports")
 def pages() -> dict[str, str | bytes]:
     """Pages of directives that mkdocstrings fills from the docstrings."""
     homes = {name: getattr(tilestamp, name) for name in tilestamp.__all__}
-    public = "\n".join(f"::: {value.__module__}.{name}\n" for name, value in homes.items())
-    made: dict[str, str | bytes] = {
-        "api/index.md": f"# What a user needs\n\n`from tilestamp import simulate`, and so on.\n\n{public}"
-    }
+    rows = [[f"[`{name}`][{value.__module__}.{name}]", _first(value)] for name, value in homes.items()]
+    public = table(["name", "what it is"], rows)
+    made: dict[str, str | bytes] = {"api/index.md": f"# Reference\n\n`from tilestamp import ...`:\n\n{public}"}
     for floor in FLOORS:
         for folder in sorted({path.parent for path in (PACKAGE / floor).rglob("*.py")}):
             made |= _page(folder)
     return made
+
+
+def _first(value: object) -> str:
+    """First line of a docstring."""
+    return code((inspect.getdoc(value) or "").split("\n")[0])
 
 
 def _page(folder: Path) -> dict[str, str | bytes]:

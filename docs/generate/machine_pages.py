@@ -3,6 +3,7 @@
 from collections import Counter
 
 from texts import code, table
+
 from tilestamp.models.machine import FOLDER, list_machines, load_machine
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Issue, Latency, Launching, Memory, Pipe, Sm
 
@@ -13,9 +14,10 @@ PARTS = {
 }  # fmt: skip
 INTRODUCTION = """# Machines
 
-A machine is a file of numbers (`models/machines/NAME.toml`), each with its provenance: **measured** by our micro-benchmarks,
-**published**, **derived** from such numbers, **fitted** to published or measured cells (which, the file says), or **assumed**. The
-table counts them. Only where numbers were measured can times be trusted to per cents ([accuracy](../accuracy.md)).
+A machine is a file of numbers (`models/machines/NAME.toml`), each with its provenance: **measured** by our
+micro-benchmarks, **published**, **derived** from such numbers, **fitted** to published or measured cells (which, the
+file says), or **assumed**. The table counts them. Only where numbers were measured can times be trusted to per cents
+([accuracy](../accuracy.md)).
 
 ```sh
 tilestamp list machines
@@ -31,7 +33,7 @@ def pages() -> dict[str, str | bytes]:
     names = list_machines()
     rows = [_row(name, about) for name, about in names.items()]
     index = INTRODUCTION + table(["machine", "what it is", "compute capability", *KINDS], rows)
-    return {"machines/index.md": index} | {f"machines/{name}.md": _page(name, about) for name, about in names.items()}
+    return {"machines/index.md": index} | {f"machines/{name}.md": _page(name) for name in names}
 
 
 def _row(name: str, about: str) -> list[object]:
@@ -40,14 +42,14 @@ def _row(name: str, about: str) -> list[object]:
     return [f"[{name}]({name}.md)", about, machine.compute_capability, *(counts[kind] or "" for kind in KINDS)]
 
 
-def _page(name: str, about: str) -> str:
+def _page(name: str) -> str:
     machine = load_machine(name)
     head = [line.removeprefix("#").strip() for line in _comment((FOLDER / f"{name}.toml").read_text("utf-8"))]
     parts: dict[str, list[list[object]]] = {}
     for key, (kind, source) in machine.provenance.items():
         section, _, number = key.partition(".")
         parts.setdefault(section, []).append([f"`{number}`", machine.number(key), kind, source])
-    text = f"# {name}\n\n{about}, compute capability {machine.compute_capability}.\n\n" + "\n".join(head) + "\n"
+    text = f"# {name}\n\nCompute capability {machine.compute_capability}.\n\n" + "\n".join(head) + "\n"
     for section, rows in parts.items():
         about = code((PARTS[section].__doc__ or "").split("\n\n")[0]) if section in PARTS else ""
         text += f"\n## {section}\n\n{about}\n\n{table(['number', 'value', 'provenance', 'source'], rows)}"
@@ -55,7 +57,7 @@ def _page(name: str, about: str) -> str:
 
 
 def _comment(text: str) -> list[str]:
-    """The lines of comment that a file begins with, the first one left out: it is the page's title."""
+    """The lines of comment that a file begins with; indented ones are a list."""
     lines = text.splitlines()
     end = next(index for index, line in enumerate(lines) if not line.startswith("#"))
-    return ["- " + line.removeprefix("#   ") if line.startswith("#   ") else line for line in lines[1:end]]
+    return ["- " + line.removeprefix("#   ") if line.startswith("#   ") else line for line in lines[:end]]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+
 from tilestamp import Machine, altered, load_machine, simulate
 from tilestamp.models.atomic_units import dealing_of, fullest_unit_ns
 from tilestamp.models.banks import bank_passes
@@ -191,7 +192,9 @@ def smooth() -> Any:
     """A frame over the clock and the number of SMs."""
     run = simulate("teapot", machine="gtx280", width=320, height=240, picture=False)
     rows = [("gtx280", sms, run.on(altered(run.machine, {"sm.count": sms})).milliseconds) for sms in range(10, 61, 2)]
-    return _lines(rows, "A teapot frame over the number of SMs: a better machine is never slower", "SMs", "milliseconds")
+    return _lines(
+        rows, "A teapot frame over the number of SMs: a better machine is never slower", "SMs", "milliseconds"
+    )
 
 
 PICTURES: dict[str, Callable[[], Any]] = {

@@ -10,6 +10,7 @@ from io import BytesIO
 from typing import Any
 
 from texts import code, sections, table
+
 from tilestamp import Run, list_machines, load_machine, simulate
 from tilestamp.experiments.commands.option_flags import option_table
 from tilestamp.simulator.mix import MIXES, load_mix
@@ -20,8 +21,8 @@ SIZE = {"width": 320, "height": 240}
 SCENES = {"tiled": "spot", "per-primitive": "spot", "binned": "spot"}  # textured ones
 INTRODUCTION = """# Pipelines
 
-Each pipeline executes a published rasterizer's stages as its CUDA original does, counts what they do, and makes the picture.
-What is and is not modelled stands on each page, and in the pipeline's own source.
+Each pipeline executes a published rasterizer's stages as its CUDA original does, counts what they do, and makes the
+picture. What is and is not modelled stands on each page, and in the pipeline's own source.
 
 """
 
@@ -68,8 +69,11 @@ def _page(name: str) -> str:
         code(told[""]),
         f"![{run.scene} as {name} draws it](./{name}.png)",
         f"```sh\n{command}\n```",
-        f"## Stages\n\nOf the frame above ({run.width}x{run.height}, {run.machine.name}).\n\n{_diagram(run)}\n\n{_stage_table(run)}",
-        f"## Counters\n\nColumns of `run.stages` that its stages declare, beside those that every stage has.\n\n{_counters(run)}",
+        f"## Stages\n\nOf the frame above ({run.width}x{run.height}, {run.machine.name}), with shares of its time.",
+        _diagram(run),
+        _stage_table(run),
+        "## Counters\n\nColumns of `run.stages` that its stages declare, beside those that every stage has.",
+        _counters(run),
         f"## Modelled\n\n{code(told['Modelled'])}",
         f"## Not modelled\n\n{code(told['Not modelled'])}",
         _remarks(name),
@@ -111,7 +115,11 @@ def _does(work: Any) -> str:
 def _unit(work: Any) -> str:
     if not isinstance(work, Work):
         return "an item of the pipe"
-    drawn = {"blocks": "a block", "block_queue": "an item that a block draws", "warp_queue": "an item that a warp draws"}
+    drawn = {
+        "blocks": "a block",
+        "block_queue": "an item that a block draws",
+        "warp_queue": "an item that a warp draws",
+    }
     return f"{drawn[work.dispatch]}, {work.block} threads"
 
 
@@ -124,7 +132,9 @@ def _counters(run: Run) -> str:
     rows = []
     for name, counter in run.counters.items():
         of = [stage for stage, works in _stages(run).items() if any(c.name == name for c in works[0].counters)]
-        rows.append([", ".join(f"`{column}`" for column in counter.columns), counter.title, counter.kind, ", ".join(of)])
+        rows.append(
+            [", ".join(f"`{column}`" for column in counter.columns), counter.title, counter.kind, ", ".join(of)]
+        )
     return table(["column", "what it is", "kind", "stages"], rows) if rows else "None.\n"
 
 
@@ -144,7 +154,9 @@ def _options(name: str) -> str:
 
 def _mixes(name: str) -> str:
     if name == "hardware":
-        return f"Rates of the pipe's units are in the machine file; machines that have them: {', '.join(machines(name))}."
+        return (
+            f"Rates of the pipe's units are in the machine file; machines that have them: {', '.join(machines(name))}."
+        )
     rows = []
     for path in sorted((MIXES / name).glob("cc*.toml")):
         mix = load_mix(name, f"{path.stem[2:]}.0")

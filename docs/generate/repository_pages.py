@@ -27,7 +27,7 @@ def pages() -> dict[str, str | bytes]:
         "index.md": _linked(f"{head}\n{DOORS}\n## {install}"),
         "quick-start.md": _linked("# Quick start\n\n" + "".join(f"## {part}" for part in rest)),
         "contributing.md": _linked((ROOT / "CONTRIBUTING.md").read_text("utf-8")),
-        "changelog.md": (ROOT / "CHANGELOG.md").read_text("utf-8"),
+        "changelog.md": _linked((ROOT / "CHANGELOG.md").read_text("utf-8")),
         "gallery.md": (GALLERY / "README.md").read_text("utf-8").replace("../../docs/", "").replace("](", "](gallery/")
         .replace("](gallery/accuracy.md", "](accuracy.md"),
     }  # fmt: skip

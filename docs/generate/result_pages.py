@@ -10,12 +10,32 @@ from typing import Any
 
 import pandas as pd
 from texts import code, table
+
 from tilestamp.experiments.harness.registry import FOLDER as EXPERIMENTS
 from tilestamp.experiments.harness.registry import describe, describe_folder, experiment_names, is_slow
 
 RESULTS = "TILESTAMP_RESULTS"  # names what `tilestamp reproduce -o FOLDER` left
 ATLAS = "stability"
 DETAILED = "<!-- detailed simulators -->"
+EXPERIMENTS_HEAD = """# Experiments
+
+Each compares published or measured cells with ours, cell by cell, or answers a question.
+
+```sh
+tilestamp reproduce                        # the quick ones
+tilestamp reproduce eisenacher2010         # of one paper
+tilestamp reproduce --all                  # all
+```
+"""
+ATLAS_HEAD = """# The stability atlas
+
+The parameter that breaks each method, where it does, what goes wrong, and what a cure costs. Every boundary is found by
+bisection on a small picture, and pinned by a test.
+
+```sh
+tilestamp reproduce stability
+```
+"""
 COLUMNS = ["method", "parameter", "unit", "holds", "breaks", "wrong", "cure", "cost"]
 
 
@@ -27,18 +47,14 @@ def pages() -> dict[str, str | bytes]:
 
 def detailed() -> str:
     """What other simulators published of themselves."""
-    rows = pd.read_csv(EXPERIMENTS / "frontier" / "detailed_simulators.csv").fillna("")
+    rows = pd.read_csv(EXPERIMENTS / "frontier" / "detailed_simulators.csv", dtype=str, keep_default_na=False)
     shown = rows[["name", "error_percent", "error_against", "warp_instructions_per_second", "source"]]
     columns = ["simulator", "error, %", "against", "warp instructions a second", "source"]
     return table(columns, [[_short(value) for value in row] for row in shown.itertuples(index=False)])
 
 
 def _experiments() -> str:
-    text = (
-        "# Experiments\n\nEach compares published or measured cells with ours, cell by cell, or answers a question.\n\n"
-        "```sh\ntilestamp reproduce                        # the quick ones\n"
-        "tilestamp reproduce eisenacher2010         # of one paper\ntilestamp reproduce --all                  # all\n```\n"
-    )
+    text = EXPERIMENTS_HEAD
     groups: dict[str, list[str]] = {}
     for name in experiment_names():
         groups.setdefault(name.split("/", maxsplit=1)[0], []).append(name)
@@ -49,11 +65,7 @@ def _experiments() -> str:
 
 
 def _atlas(folder: Path | None) -> dict[str, str | bytes]:
-    text = (
-        "# The stability atlas\n\nThe parameter that breaks each method, where it does, what goes wrong, and what a cure costs. "
-        "Every boundary is found by bisection on a small picture, and pinned by a test.\n\n"
-        "```sh\ntilestamp reproduce stability\n```\n"
-    )
+    text = ATLAS_HEAD
     made: dict[str, str | bytes] = {}
     for name in experiment_names():
         if name.startswith(f"{ATLAS}/"):
@@ -66,7 +78,7 @@ def _atlas(folder: Path | None) -> dict[str, str | bytes]:
             for path in sorted(result.glob("*.png")):
                 place = f"atlas/{result.name}-{path.name}"
                 made[place] = path.read_bytes()
-                text += f'\n![{escape(_alt(result, path.name, describe(name)))}]({place}){{ loading=lazy }}\n'
+                text += f"\n![{escape(_alt(result, path.name, describe(name)))}]({place}){{ loading=lazy }}\n"
     return {"atlas.md": text} | made
 
 
@@ -94,4 +106,6 @@ def _short(value: object) -> str:
 def _alt(result: Path, name: str, otherwise: str) -> str:
     """What a plot shows, where the result says so."""
     said: dict[str, Any] = json.loads(path.read_text("utf-8")) if (path := result / "result.json").is_file() else {}
-    return next((plot["alt"] for plot in said.get("figures", []) if plot["file"] == name and plot.get("alt")), otherwise)
+    return next(
+        (plot["alt"] for plot in said.get("figures", []) if plot["file"] == name and plot.get("alt")), otherwise
+    )

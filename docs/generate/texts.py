@@ -19,9 +19,7 @@ def sections(docstring: str | None) -> dict[str, str]:
     """Parts of a docstring by their underlined titles; what stands before the first one is ""."""
     text = inspect.cleandoc(docstring or "")
     parts = re.split(r"^(.+)\n-{3,}\n", text, flags=re.MULTILINE)
-    return {"": parts[0].strip()} | {
-        title: body.strip() for title, body in zip(parts[1::2], parts[2::2], strict=True)
-    }
+    return {"": parts[0].strip()} | {title: body.strip() for title, body in zip(parts[1::2], parts[2::2], strict=True)}
 
 
 def code(text: str) -> str:
