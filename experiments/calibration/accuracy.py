@@ -80,8 +80,9 @@ def _head(results: Path, times: "pd.DataFrame") -> Iterator[str]:
 
 Everything here was computed from runs of `tilestamp reproduce` on machine `h200`, beside what was measured on an H200;
 [time.md](time.md) says how a time is made, [machine-model.md](machine-model.md) what explains the errors. A scene
-is *seen* where some number was fitted to a cell of it (in that experiment), and *unseen* where none was. The form of the model was chosen
-with both in sight: no number was fitted to an unseen scene, but it is not blind. Ratios are predicted over measured.
+is *seen* where some number was fitted to a cell of it (in that experiment), and *unseen* where none was. The form of
+the model was chosen with both in sight: no number was fitted to an unseen scene, but it is not blind. Ratios are
+predicted over measured.
 
 ![Predicted against measured times of {len(times)} launches, both logarithmic, a colour a system, filled points for \
 the {len(unseen)} of unseen scenes: mean error {_percent(errors(times).mean)} %](../{PLOT})
