@@ -58,10 +58,12 @@ def machines(name: str) -> list[str]:
 
 @cache
 def run_of(name: str) -> Run:
+    """A small frame of the pipeline."""
     return simulate(SCENES.get(name, "teapot"), name, machines(name)[0], **SIZE)
 
 
 def page(name: str) -> str:
+    """The page of one pipeline."""
     run, told = run_of(name), sections(_module(name).__doc__)
     command = f"tilestamp render {run.scene} --pipeline {name} --machine {run.machine.name} -o {name}.png"
     parts = [
