@@ -10,11 +10,13 @@ import pytest
 
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.harness.registry import select
+from tilestamp.models.machine import load_machine
 from tilestamp.simulator.pipelines import pipeline_names
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "reports" / "gallery" / "README.md"])
 MADE = ("machines/", "pipelines/", "time/", "atlas.md")  # pages of the site that are made when it is built
+FLOORS = ("models", "simulator", "experiments", "reports")
 NEEDS_A_GPU = {"measure-machine", "validate"}
 
 
@@ -70,3 +72,63 @@ def test_a_command_of_the_questions_works(command, tmp_path, monkeypatch, capsys
     else:
         rest += ["--size", "96x72"]
     assert run_command([name, *rest]) == 0, capsys.readouterr().err
+
+
+@pytest.fixture
+def generate(monkeypatch):
+    """Import a module of those that make pages."""
+    monkeypatch.syspath_prepend(ROOT / "docs" / "generate")
+    return import_module
+
+
+def test_a_machines_page_has_each_number_with_where_it_is_from(generate):
+    machine = load_machine("h200")
+    page = generate("machine_pages").pages()["machines/h200.md"]
+    rows = [line.split(" | ") for line in page.splitlines() if line.startswith("| `")]
+    found = {(row[0].strip("| `"), row[2]) for row in rows}
+    assert found == {(key.partition(".")[2], kind) for key, (kind, _) in machine.provenance.items()}
+
+
+def test_a_pipelines_page_has_its_stages_in_order_its_options_and_what_is_not_modelled(generate):
+    page = generate("pipeline_pages").page("tiled")
+    run = generate("pipeline_pages").run_of("tiled")
+    boxes = re.findall(r"<li><b>(.*?)</b>", page)
+    assert boxes == list(run.stages.index)
+    assert [name for name in run.options if f"| `{name}` |" not in page] == []
+    assert "## Not modelled\n\n- Clipping" in page
+
+
+def test_the_reference_has_every_module(generate):
+    pages = "\n".join(generate("api_pages").pages().values())
+    package = ROOT / "tilestamp"
+    modules = [path for floor in FLOORS for path in (package / floor).rglob("[a-z]*.py") if "/_" not in str(path)]
+    names = [f"::: {'.'.join(path.relative_to(ROOT).with_suffix('').parts)}\n" for path in modules]
+    assert [name for name in names if name not in pages] == []
+
+
+def test_the_atlas_shows_what_a_results_folder_has(generate, tmp_path, monkeypatch):
+    result = tmp_path / "stability-cracks"
+    result.mkdir()
+    (result / "cracks.png").write_bytes(b"plot")
+    (result / "boundaries.csv").write_text(
+        "method,parameter,unit,holds,breaks,wrong,cure,cost\nm,p|q,u,1.23456789,,w,c,\n"
+    )
+    monkeypatch.setenv("TILESTAMP_RESULTS", str(tmp_path))
+    made = generate("result_pages").pages()
+    assert made["atlas/stability-cracks-cracks.png"] == b"plot"
+    assert "| m | p\\|q | u | 1.2346 |  | w | c |  |" in made["atlas.md"]
+    assert "`tilestamp reproduce stability/slivers` draws it" in made["atlas.md"]
+
+
+def test_the_table_of_silicon_has_the_measured_beside_the_model(generate):
+    text = generate("model_tables").silicon()
+    cells = [line.split(" | ")[1:3] for line in text.splitlines()[2:]]
+    pairs = [(float(known), float(ours.strip(" |"))) for known, ours in cells if known]
+    assert len(pairs) >= 9
+    assert all(ours == pytest.approx(known, rel=0.1, abs=0.1) or known > 13 for known, ours in pairs)
+
+
+def test_each_mark_for_a_table_is_on_a_page(generate):
+    text = "".join(page.read_text("utf-8") for page in PAGES)
+    marks = generate("model_tables").TABLES | generate("result_pages").TABLES
+    assert set(re.findall(r"^<!-- .* -->$", text, re.MULTILINE)) >= set(marks)

@@ -29,13 +29,13 @@ picture. What is and is not modelled stands on each page, and in the pipeline's 
 
 def pages() -> dict[str, str | bytes]:
     """The index, and a page for each pipeline."""
-    rows = [[f"[{name}]({name}.md)", _about(name), len(_stages(_run(name)))] for name in pipeline_names()]
+    rows = [[f"[{name}]({name}.md)", _about(name), len(_stages(run_of(name)))] for name in pipeline_names()]
     made: dict[str, str | bytes] = {
         "pipelines/index.md": INTRODUCTION + table(["pipeline", "what it draws", "stages"], rows)
     }
     for name in pipeline_names():
-        made[f"pipelines/{name}.md"] = _page(name)
-        made[f"pipelines/{name}.png"] = _png(_run(name))
+        made[f"pipelines/{name}.md"] = page(name)
+        made[f"pipelines/{name}.png"] = _png(run_of(name))
     return made
 
 
@@ -57,12 +57,14 @@ def machines(name: str) -> list[str]:
 
 
 @cache
-def _run(name: str) -> Run:
+def run_of(name: str) -> Run:
+    """A small frame of the pipeline."""
     return simulate(SCENES.get(name, "teapot"), name, machines(name)[0], **SIZE)
 
 
-def _page(name: str) -> str:
-    run, told = _run(name), sections(_module(name).__doc__)
+def page(name: str) -> str:
+    """The page of one pipeline."""
+    run, told = run_of(name), sections(_module(name).__doc__)
     command = f"tilestamp render {run.scene} --pipeline {name} --machine {run.machine.name} -o {name}.png"
     parts = [
         f"# {name}",

@@ -16,7 +16,6 @@ from tilestamp.experiments.harness.registry import describe, describe_folder, ex
 
 RESULTS = "TILESTAMP_RESULTS"  # names what `tilestamp reproduce -o FOLDER` left
 ATLAS = "stability"
-DETAILED = "<!-- detailed simulators -->"
 EXPERIMENTS_HEAD = """# Experiments
 
 Each compares published or measured cells with ours, cell by cell, or answers a question.
@@ -109,3 +108,6 @@ def _alt(result: Path, name: str, otherwise: str) -> str:
     return next(
         (plot["alt"] for plot in said.get("figures", []) if plot["file"] == name and plot.get("alt")), otherwise
     )
+
+
+TABLES = {"<!-- detailed simulators -->": detailed}

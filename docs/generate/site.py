@@ -9,6 +9,7 @@ import api_pages
 import architecture_picture
 import machine_pages
 import mechanism_pictures
+import model_tables
 import pipeline_pages
 import repository_pages
 import result_pages
@@ -54,7 +55,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001 - a hook's
     """Pages of the repository link to files of the repository: those that the site has, it has elsewhere."""
-    text = architecture_picture.drawn(markdown).replace(result_pages.DETAILED, result_pages.detailed())
+    text = architecture_picture.drawn(markdown)
+    for mark, made in (result_pages.TABLES | model_tables.TABLES).items():
+        text = text.replace(mark, made()) if mark in text else text
     return "\n".join(_linked(text.split("\n"), page.file.src_uri.count("/")))
 
 
