@@ -63,6 +63,7 @@ def run(progress: Callable[[str], None]) -> Result:
             "% STE",
             published=r["closed_form"],
             ours=r["ste"],
+            status="reproduced",
         )
         for r in rows
     ]
