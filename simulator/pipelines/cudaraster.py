@@ -47,6 +47,7 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline cudaraster."""
 
     persistent: ClassVar[bool] = True
+    votes: ClassVar[bool] = True
     release: Release = "1.1"
     """CudaRaster 1.1, or the copy in nvdiffrast."""
     msaa: Literal[1, 2, 4, 8] = 1

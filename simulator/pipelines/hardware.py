@@ -1,6 +1,6 @@
 """The fixed-function pipe of the GPU itself, for comparison: vertices, setup, quads, depth, pixels."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -21,6 +21,7 @@ from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle
 class HardwareOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline hardware."""
 
+    fixed_function: ClassVar[bool] = True
     cull_backfaces: bool = True
     """Leave out what is clockwise on the screen."""
     bits: Annotated[int, Meta(ge=4, le=8)] = SUBPIXEL_BITS

@@ -6,7 +6,7 @@ instead of the buckets.
 """
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -43,6 +43,7 @@ REMARKS = {
 class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline micropolygon."""
 
+    patches: ClassVar[bool] = True
     tile: TileSize = 8
     """Pixels on a side of a screen tile."""
     spp: Literal[1, 4, 16] = 1

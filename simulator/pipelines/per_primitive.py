@@ -1,6 +1,6 @@
 """Ru 2016: one thread a triangle, atomicMin on depth, an unprotected fragment write."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space,
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
+    textures: ClassVar[bool] = True
     cull_backfaces: bool = True
     """Leave out triangles that face away, as both published versions do."""
     race: bool = True

@@ -1,6 +1,6 @@
 """Ru 2016: triangles listed by tile, one block a tile, one thread a pixel."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -26,6 +26,7 @@ from tilestamp.simulator.work import Work
 class TiledOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline tiled."""
 
+    textures: ClassVar[bool] = True
     tile: Annotated[int, Meta(ge=4, le=32)] = 8
     """Pixels on a side of a tile; a block has a thread for each."""
     cull_backfaces: bool = True
