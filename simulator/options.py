@@ -41,6 +41,8 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
 
     votes: ClassVar[bool] = False
     """Whether its kernels need ballots over warps of 32."""
+    maps: ClassVar[dict[str, str]] = {}
+    """Heat maps that it makes beside the picture, and what each shows."""
     patches: ClassVar[bool] = False
     """Whether it draws nothing but patches."""
     textures: ClassVar[bool] = False

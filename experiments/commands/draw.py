@@ -4,9 +4,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
 from tilestamp.models.errors import TilestampError, UnableError
 from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.launchable import able_machines, check_launches
 from tilestamp.simulator.pipelines import options_type, pipeline_options
 from tilestamp.simulator.run import Run
@@ -29,6 +33,8 @@ class Wanted:
     camera: str | None = None
     zoom: float = 1.0
     texture: Path | None = None
+    map_: str | None = None
+    """Counter whose heat map is wanted."""
     changes: tuple[str, ...] = ()
     """Of the machine, ``SECTION.NAME=VALUE``."""
     flags: dict[str, str | bool | None] = field(default_factory=dict)
@@ -62,12 +68,16 @@ def draw(wanted: Wanted, **asked: Any) -> tuple[Run, str]:
     priced = asked["counting"] and asked["fidelity"] != "counts"
     if wanted.pipeline and machine and priced:  # before the scene is read
         check_launches(wanted.pipeline, pipeline_options(wanted.pipeline, wanted.options(wanted.pipeline)), machine)
+    image = _image(wanted.texture) if wanted.texture else None
     scene = load_scene(wanted.scene)
-    pipeline = wanted.pipeline or _pipeline_for(scene, machine, textured=wanted.texture is not None)
+    pipeline = wanted.pipeline or _pipeline_for(scene, machine, textured=image is not None)
     _check_scene(scene, pipeline, wanted, machine)
+    _check_map(pipeline, wanted.map_)
     options = wanted.options(pipeline)
-    if wanted.texture is not None:
-        scene, options = _textured(scene, options_type(pipeline).patches, wanted.texture, options)
+    if image is not None and options_type(pipeline).patches:
+        options |= {"texture": image}
+    elif image is not None:
+        scene = load_scene(wanted.scene, texture=image)
     ours = machine or wanted.described(_machine_for(pipeline))
     width, height = wanted.size
     run = simulate(scene, pipeline, ours, width=width, height=height, camera=_camera(wanted, scene), **asked, **options)
@@ -118,16 +128,22 @@ def _check_scene(scene: Scene, pipeline: str, wanted: Wanted, machine: Machine |
     raise UnableError(f"the pipeline {pipeline} {what}; {other} can", pipeline=other, **ours)
 
 
-def _textured(scene: Scene, patches: bool, file: Path, options: dict[str, Any]) -> tuple[Scene, dict[str, Any]]:
-    """Lay an image over each patch, or over a mesh by its coordinates."""
+def _check_map(pipeline: str, name: str | None) -> None:
+    """Refuse a heat map that the pipeline does not make."""
+    maps = list(options_type(pipeline).maps)
+    if name is not None and name not in maps:
+        has = f"{did_you_mean(name, maps)}; it has {', '.join(maps) or 'none'}"
+        raise TilestampError(f"the pipeline {pipeline} draws no map of {name}{has}")
+
+
+def _image(file: Path) -> NDArray[np.uint8]:
+    """Read the image that is to be laid over the scene."""
     from tilestamp.simulator.scenes.images import read_image
-    from tilestamp.simulator.scenes.textured_mesh import with_texture
 
     try:
-        image = read_image(file.read_bytes(), f"--texture {file}")
+        return read_image(file.read_bytes(), f"--texture {file}")
     except OSError as error:
         raise TilestampError(f"--texture {file}: cannot be read ({error.strerror or error})") from None
-    return (scene, options | {"texture": image}) if patches else (with_texture(scene, image), options)
 
 
 def _why(wanted: Wanted, scene: Scene, pipeline: str, machine: str) -> str:

@@ -105,7 +105,7 @@ def render(
         raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
-    wanted = Wanted(scene, pipeline, machine, parse_size(size), camera, zoom, texture, set_, flags, option)
+    wanted = Wanted(scene, pipeline, machine, parse_size(size), camera, zoom, texture, map_, set_, flags, option)
     asked: dict[str, Any] = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting}
     with progress(f"drawing {scene}") as say:
         run, chosen = draw(wanted, picture=output is not None, **asked)

@@ -40,6 +40,7 @@ REMARKS = {
 class BinnedOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline binned."""
 
+    maps: ClassVar[dict[str, str]] = {"tile queue": "triangles in a tile's queue"}
     textures: ClassVar[bool] = True
     order: Order = "api"
     """Blend in the order of the triangles with a depth test, or by depth without one (oit: order-independent

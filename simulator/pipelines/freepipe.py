@@ -1,6 +1,6 @@
 """FreePipe: one kernel, one thread a triangle, atomics on a frame buffer in DRAM (Liu et al. 2010)."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -28,6 +28,10 @@ REMARKS = {
 class FreepipeOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline freepipe."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tied_pixels": "pixels where another fragment has the same packed depth",
+        "mixed_pixels": "pixels whose colour is made of two fragments' halves",
+    }
     packing: Packing = "64"
     """One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then a
     triangle has one colour, the mean of its corners)."""

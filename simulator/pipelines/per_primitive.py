@@ -25,6 +25,10 @@ from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space,
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "race": "pixels that unprotected writes leave wrong",
+        "pixels wrong by the race": "the same",
+    }
     textures: ClassVar[bool] = True
     cull_backfaces: bool = True
     """Leave out triangles that face away, as both published versions do."""

@@ -26,6 +26,12 @@ from tilestamp.simulator.work import Work
 class TiledOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline tiled."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tests": "sample tests in a tile",
+        "ste": "sample test efficiency in a tile",
+        "atomics": "atomics on a tile's list",
+        "list length": "triangles in a tile's list",
+    }
     textures: ClassVar[bool] = True
     tile: Annotated[int, Meta(ge=4, le=32)] = 8
     """Pixels on a side of a tile; a block has a thread for each."""

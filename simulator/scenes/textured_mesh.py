@@ -76,7 +76,7 @@ def with_texture(scene: Scene, image: NDArray[np.uint8]) -> Scene:
         The mesh has no texture coordinates.
     """
     mesh = scene.mesh
-    if mesh is None or mesh.uvs is None:
+    if mesh is None or mesh.uvs is None or not np.isfinite(mesh.uvs).any():
         raise TilestampError(f"{scene.name} has no texture coordinates, by which a texture could be laid on it")
     ids = np.zeros(len(mesh.triangles), np.int32)
     return dataclasses.replace(scene, mesh=dataclasses.replace(mesh, textures=(image,), texture_ids=ids))
