@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shlex
 import signal
 import sys
 from types import FrameType
@@ -101,9 +102,22 @@ def _run(arguments: list[str]) -> int:
     try:
         code = _app(arguments)(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except (TilestampError, CycloptsError) as error:
-        sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}\n")
+        sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}{_try(arguments, error)}\n")
         return BAD_INPUT
     return code if isinstance(code, int) else 0
+
+
+def _try(arguments: list[str], error: Exception) -> str:
+    """Clause with the command that would do, where another choice can."""
+    instead: dict[str, str] = getattr(error, "instead", {})
+    if not instead or arguments[:1] != ["render"]:
+        return ""
+    kept, flags = list(arguments), [f"--{name}" for name in instead]
+    for index in reversed(range(len(kept))):
+        flag, value, _ = kept[index].partition("=")
+        if flag in flags:
+            del kept[index : index + (1 if value else 2)]
+    return f"; try: {shlex.join(['tilestamp', *kept, *(f'--{name}={value}' for name, value in instead.items())])}"
 
 
 def _app(arguments: list[str]) -> "App":
@@ -120,8 +134,9 @@ def _app(arguments: list[str]) -> "App":
     )
     for name, (place, line) in COMMANDS.items():
         if name == "render" and arguments[:1] == [name]:
+            from tilestamp.experiments.commands.draw import PIPELINE
             from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
-            from tilestamp.experiments.commands.render import PIPELINE, render
+            from tilestamp.experiments.commands.render import render
 
             app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)))
         else:

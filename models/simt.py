@@ -31,6 +31,11 @@ class Simt(NamedTuple):
     bank_bytes: int = 4  # that a bank of shared memory serves a pass: 8 on 3.x
     bank_mode_bytes: int = 4  # consecutive words of this size lie in consecutive banks: 4 or 8 on 3.x
 
+    @property
+    def votes(self) -> bool:
+        """Whether the lanes of warps of 32 can vote: from compute capability 2.0 on."""
+        return self.warp == 32 and self.coalescing != Coalescing.HALF_WARP_SEGMENTS
+
     def differences(self, other: "Simt", *, persistent: bool) -> list[str]:
         """Say what is counted otherwise on another machine; the number of SMs only for ``persistent`` kernels."""
         pairs = zip(self._fields, self, other, strict=True)

@@ -1,36 +1,57 @@
-"""What a machine can launch: the blocks whose shape a pipeline's options decide, before anything is executed."""
+"""What a machine can run: what its hardware has, and blocks that it can launch, before anything is executed."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import msgspec
 
-from tilestamp.models.errors import TilestampError
-from tilestamp.models.machine import Machine
+from tilestamp.models.errors import TilestampError, UnableError
+from tilestamp.models.machine import Machine, list_machines, load_machine
 from tilestamp.models.occupancy import residency
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.options import Options, choices, plain
 from tilestamp.simulator.pipelines import pipeline_options
 
 MANY = 6  # values that a sentence names one by one
+PROPOSED = 3  # machines that a sentence names
+FIRST = ("gtx280", "gtx480", "h200")  # machines that are proposed before others: of the papers, and measured
 
 
 def check_launches(pipeline: str, options: Options, machine: Machine) -> None:
-    """Refuse options that make a block which the machine cannot launch.
+    """Refuse a machine that lacks what the pipeline runs on, and options that make a block which it cannot launch.
 
     Raises
     ------
-    TilestampError
-        Saying what exceeds (threads, registers or shared memory), and which value of which option would do.
+    UnableError
+        Saying what it lacks or what exceeds (threads, registers or shared memory), which value of which option would
+        do, and which machines can run it as it is.
     """
     try:
-        _reside(pipeline, options, machine)
+        _check(pipeline, options, machine)
     except TilestampError as error:
         cures = launchable_values(pipeline, options, machine).items()
         cure = ", or ".join(f"{name} {listed(values)}" for name, values in cures if values)
-        raise TilestampError(f"{error}{'; it can launch ' if cure else ''}{cure}") from None
+        able = list(able_machines(pipeline, options))
+        others = f"; {listed(able[:PROPOSED])} can run it" if able else ""
+        instead = {"machine": able[0]} if able else {}
+        raise UnableError(f"{error}{'; it can launch ' if cure else ''}{cure}{others}", **instead) from None
 
 
-def _reside(pipeline: str, options: Options, machine: Machine) -> None:
+def able_machines(pipeline: str, options: Options) -> Iterator[str]:
+    """Machines of the package that can run a pipeline with some options: well known ones first."""
+    for name in (*FIRST, *(name for name in list_machines() if name not in FIRST)):
+        if _can_launch(pipeline, plain(options), load_machine(name)):
+            yield name
+
+
+def _check(pipeline: str, options: Options, machine: Machine) -> None:
+    if options.votes and not machine.simt.votes:
+        raise TilestampError(
+            f"{machine.name} (compute capability {machine.compute_capability}) cannot run {pipeline}, which votes over"
+            " warps of 32 and needs 2.0 or later"
+        )
+    if options.fixed_function and machine.fixed_function is None:
+        raise TilestampError(f"the machine {machine.name} describes no fixed-function pipe, which {pipeline} runs on")
     for work in options.launches(machine.simt):
         launch = load_mix(pipeline, machine.compute_capability).launch(work, machine.sm.warp_size)
         residency(machine, launch.block, launch.registers, launch.shared_bytes)
@@ -49,7 +70,7 @@ def launchable_values(pipeline: str, options: Options, machine: Machine) -> dict
 
 def _can_launch(pipeline: str, given: dict[str, Any], machine: Machine) -> bool:
     try:
-        _reside(pipeline, pipeline_options(pipeline, given), machine)
+        _check(pipeline, pipeline_options(pipeline, given), machine)
     except TilestampError:
         return False
     return True

@@ -39,6 +39,17 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
             value = checked(field.name, field.type, getattr(self, field.name))
             msgspec.structs.force_setattr(self, field.name, value)
 
+    votes: ClassVar[bool] = False
+    """Whether its kernels need ballots over warps of 32."""
+    maps: ClassVar[dict[str, str]] = {}
+    """Heat maps that it makes beside the picture, and what each shows."""
+    patches: ClassVar[bool] = False
+    """Whether it draws nothing but patches."""
+    textures: ClassVar[bool] = False
+    """Whether it shows the textures of a mesh."""
+    fixed_function: ClassVar[bool] = False
+    """Whether it runs on the fixed-function pipe."""
+
     def launches(self, simt: Simt) -> list["Work"]:  # noqa: ARG002 - for those that have some
         """Launches whose blocks these options shape, without rows: what a machine may not be able to launch."""
         return []

@@ -84,9 +84,10 @@ def simulate(
     )
     width, height, error, counting = drawing.width, drawing.height, drawing.error, drawing.counting
     chosen = pipeline_options(pipeline, options)
-    scene, machine = load_scene(scene), load_machine(machine)
-    if drawing.fidelity != "counts" and counting:
+    machine = load_machine(machine)
+    if chosen.votes or (drawing.fidelity != "counts" and counting):
         check_launches(pipeline, chosen, machine)
+    scene = load_scene(scene)
     matrix = clip_matrix(read_camera(camera, scene), width, height)
     sampled = error and counting
     execute = (

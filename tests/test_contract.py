@@ -33,6 +33,10 @@ def test_something_is_drawn(run):
     assert (run.image != run.image[0, 0]).any()
 
 
+def test_its_maps_are_declared_with_the_options(run):
+    assert list(run.frame.maps) == list(options_type(run.pipeline).maps)
+
+
 def test_depth_has_a_value_a_pixel(run):
     assert run.depth.shape == (HEIGHT, WIDTH)
 

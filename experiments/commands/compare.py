@@ -9,9 +9,10 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from tilestamp.experiments.commands.compared import Compared, from_run, print_comparison, saved, write_plot
+from tilestamp.experiments.commands.draw import PIPELINE
 from tilestamp.experiments.commands.option_flags import given_options, literal, parted
 from tilestamp.experiments.commands.outputs import check_png, write_json
-from tilestamp.experiments.commands.render import PIPELINE, parse_size
+from tilestamp.experiments.commands.render import parse_size
 from tilestamp.experiments.commands.terminal import Progress, progress
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, altered, load_machine

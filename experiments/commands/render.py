@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from cyclopts import Parameter
 
-from tilestamp.experiments.commands.option_flags import given_options, literal, once, parted
+from tilestamp.experiments.commands.draw import Wanted, draw
 from tilestamp.experiments.commands.outputs import check_file, check_png, write_json
 from tilestamp.experiments.commands.render_output import as_json, map_path, print_run, write_map, write_png
 from tilestamp.experiments.commands.tables import print_lines
@@ -14,21 +14,20 @@ from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.commands.trace import draw_timeline, write_schedule
 from tilestamp.experiments.commands.why import print_why, why_json, write_tornado
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.pipelines import options_type
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sensitivity import Sensitivity
-
-PIPELINE = "micropolygon"  # where none is named
 
 
 def render(
     scene: str,
     /,
     *,
-    pipeline: str = PIPELINE,
-    machine: str = "gtx280",
+    pipeline: str | None = None,
+    machine: str | None = None,
     size: str = "1024x768",
     camera: str | None = None,
+    zoom: float = 1.0,
+    texture: Path | None = None,
     fidelity: Literal["counts", "bounds", "schedule"] = "schedule",
     error: float = 0.0,
     seed: int = 0,
@@ -52,13 +51,18 @@ def render(
     scene
         A name (`tilestamp list scenes`) or a file: .bpt, .obj, .ply, .glb, .npz...
     pipeline
-        See `tilestamp list pipelines`; `--pipeline NAME --help` shows its options.
+        See `tilestamp list pipelines`; `--pipeline NAME --help` shows its options. If not given, micropolygon where the
+        scene has patches, cudaraster where it has only triangles.
     machine
-        See `tilestamp list machines`, or a machine file.
+        See `tilestamp list machines`, or a machine file. If not given, gtx280, or the first that can run the pipeline.
     size
         WIDTHxHEIGHT in pixels.
     camera
-        A view of the scene by name, or a JSON file (`FILE.json`, `FILE.json:KEY`).
+        A view of the scene by name (`tilestamp list views SCENE`), or a JSON file (`FILE.json`, `FILE.json:KEY`).
+    zoom
+        2 puts the eye at half the distance from what the camera looks at.
+    texture
+        Image to lay over a mesh that has texture coordinates, or over each patch.
     fidelity
         counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine.
     error
@@ -91,7 +95,6 @@ def render(
     timeline
         PNG file for the same as a picture: which SMs are taken over time.
     """
-    width, height = parse_size(size)
     if output is None and map_ is not None:
         raise TilestampError("--map writes beside the picture: give -o FILE.png too")
     for file, flag in ((output, "-o"), (tornado, "--tornado"), (timeline, "--timeline")):
@@ -102,11 +105,10 @@ def render(
         raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
     if error and output is not None:
         raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
-    options = given_options(options_type(pipeline), flags, option)
+    wanted = Wanted(scene, pipeline, machine, parse_size(size), camera, zoom, texture, map_, set_, flags, option)
     asked: dict[str, Any] = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting}
-    asked |= {"picture": output is not None} | options
     with progress(f"drawing {scene}") as say:
-        run = _simulate(scene, pipeline, machine, set_, (width, height), camera, asked)
+        run, chosen = draw(wanted, picture=output is not None, **asked)
         if run.counted or output is None:  # without counts there is only a picture
             say("pricing")
             _ = run.stage_rows
@@ -119,7 +121,7 @@ def render(
         write_json(as_json(run) | ({"why": why_json(explained.found)} if explained.found else {}))
         return
     print_run(run, output, map_, columns)
-    print_lines(*explained.lines)
+    print_lines(*explained.lines, *filter(None, [chosen]))
     if explained.found is not None and why:
         print_why(run, explained.found)
 
@@ -144,26 +146,6 @@ def _explained(run: Run, why: bool, tornado: Path | None, trace: Path | None, ti
         draw_timeline(run, timeline)
         lines.append(f"timeline: {timeline}")
     return _Explained(found, lines)
-
-
-def _simulate(
-    scene: str,
-    pipeline: str,
-    machine: str,
-    changes: tuple[str, ...],
-    size: tuple[int, int],
-    camera: str | None,
-    asked: dict[str, Any],
-) -> Run:
-    """Load the machine with its what-ifs and simulate."""
-    from tilestamp.models.machine import altered, load_machine
-    from tilestamp.simulator.simulation import simulate
-
-    described = load_machine(machine)
-    if changes:
-        written = {name: literal(value) for name, value in once(map(parted, changes)).items()}
-        described = altered(described, written, "assumed", "a what-if on the command line")
-    return simulate(scene, pipeline, described, width=size[0], height=size[1], camera=camera, **asked)
 
 
 def parse_size(size: str) -> tuple[int, int]:

@@ -1,7 +1,7 @@
 """What the micropolygon pipelines of 2009 and 2012 share: options of their input, and their picture as a frame."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -22,6 +22,10 @@ REMARKS = {
 class DicedInput(Options, frozen=True, kw_only=True):
     """How many micropolygons there are."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tests": "sample tests at a pixel",
+        "micropolygons": "number of the micropolygon that a pixel shows",
+    }
     edge: Annotated[float, Meta(gt=0)] = 1.0
     """Micropolygons of patches have edges of at most so many pixels."""
     triangles: bool = False

@@ -15,7 +15,7 @@ Not modelled
 - Kernels before their optimization on 9.0: they have the instructions of 8.6.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -30,7 +30,8 @@ from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import MAX_LEVELS, TILE, texture_chains
 from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
-from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer
+from tilestamp.simulator.stages.zhang2025.coarse_bin import CoarseRasterizerEvent
+from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer, coarse_work
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
 from tilestamp.simulator.stages.zhang2025.frame_clears import frame_clears
 from tilestamp.simulator.stages.zhang2025.pixel_shader import OVERDRAW, Filter, pixel_shader
@@ -42,6 +43,7 @@ from tilestamp.simulator.stages.zhang2025.rop_block import RopEvent
 from tilestamp.simulator.stages.zhang2025.streaming_to_frame_buffer import streaming_to_frame_buffer
 from tilestamp.simulator.stages.zhang2025.triangle_setup import triangle_setup
 from tilestamp.simulator.stages.zhang2025.vertex_fetch_and_shading import vertex_fetch_and_shading
+from tilestamp.simulator.work import Work
 
 REMARKS = {
     "holes": "{:,} pixels are holes: the stepped depth of all their fragments fails the last test",
@@ -56,6 +58,8 @@ REMARKS = {
 class BinnedOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline binned."""
 
+    maps: ClassVar[dict[str, str]] = {"tile queue": "triangles in a tile's queue"}
+    textures: ClassVar[bool] = True
     order: Order = "api"
     """Blend in the order of the triangles with a depth test, or by depth without one (oit: order-independent
     transparency; then nothing is rejected early)."""
@@ -80,6 +84,10 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """The kernels after the optimizations that the source lists, or before."""
     original_faults: bool = False
     """As the original, leave out the rows beyond whole blocks of 32 (the top 24 of 1080), and a frame's fragment 0."""
+
+    def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
+        """The coarse rasterizer takes the most registers and shared memory."""
+        return [coarse_work(np.zeros((0, len(CoarseRasterizerEvent)), np.int64), unrolled=self.optimized)]
 
 
 def binned(

@@ -33,6 +33,7 @@ from tilestamp.simulator.stages.yao2011.bit_mask import bit_mask as filter_sampl
 class BitMaskOptions(MicropolygonInput, frozen=True, kw_only=True):
     """Options of the pipeline bit-mask."""
 
+    maps: ClassVar[dict[str, str]] = MicropolygonInput.maps | {"wrong": "pixels that the mask makes wrong"}
     persistent: ClassVar[bool] = True
     mask: MaskKind = "plain"
     """The paper's mask, one for each facing, or one that also looks at depth and is exact."""

@@ -60,7 +60,13 @@ from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle
 class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline cudaraster."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tile_triangles": "triangles in a tile's queue",
+        "tile_fragments": "fragments of a tile",
+        "tile_z_kills": "triangles of a tile that its depth rejects",
+    }
     persistent: ClassVar[bool] = True
+    votes: ClassVar[bool] = True
     release: Release = "1.1"
     """CudaRaster 1.1, or the copy in nvdiffrast."""
     msaa: Literal[1, 2, 4, 8] = 1

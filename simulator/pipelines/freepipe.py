@@ -14,7 +14,7 @@ Not modelled
 - Order-independent blending by several kept layers.
 """
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -42,6 +42,10 @@ REMARKS = {
 class FreepipeOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline freepipe."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tied_pixels": "pixels where another fragment has the same packed depth",
+        "mixed_pixels": "pixels whose colour is made of two fragments' halves",
+    }
     packing: Packing = "64"
     """One 64-bit atomicMin of depth and triangle, or the original's two 32-bit ones of depth and half a colour (then a
     triangle has one colour, the mean of its corners)."""

@@ -15,7 +15,7 @@ Not modelled
 - Several units that take turns at being the bottleneck within a frame: the slowest one over the frame sets the time.
 """
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -36,6 +36,7 @@ from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle
 class HardwareOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline hardware."""
 
+    fixed_function: ClassVar[bool] = True
     cull_backfaces: bool = True
     """Leave out what is clockwise on the screen."""
     bits: Annotated[int, Meta(ge=4, le=8)] = SUBPIXEL_BITS

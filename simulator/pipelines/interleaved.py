@@ -22,8 +22,9 @@ from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import frame_of
 from tilestamp.simulator.pipelines._motion import MotionInput, moving_micropolygons
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, interleaved_pattern
+from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, empty_work, interleaved_pattern
 from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
+from tilestamp.simulator.work import Work
 
 
 class InterleavedOptions(MotionInput, frozen=True, kw_only=True):
@@ -32,6 +33,10 @@ class InterleavedOptions(MotionInput, frozen=True, kw_only=True):
     persistent: ClassVar[bool] = True
     tile: Annotated[int, Meta(ge=1, le=8)] = 2
     """Pixels on a side of the tile whose samples all differ in time and lens point: 2 gives the paper's 16 at 4 spp."""
+
+    def launches(self, simt: Simt) -> list[Work]:
+        """One kernel."""
+        return [empty_work("interleaved", simt)]
 
 
 def interleaved(

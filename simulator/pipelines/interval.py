@@ -23,8 +23,9 @@ from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import frame_of
 from tilestamp.simulator.pipelines._motion import MotionInput, moving_micropolygons
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, stratified_pattern
+from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, empty_work, stratified_pattern
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_interval
+from tilestamp.simulator.work import Work
 
 
 class IntervalOptions(MotionInput, frozen=True, kw_only=True):
@@ -33,6 +34,10 @@ class IntervalOptions(MotionInput, frozen=True, kw_only=True):
     persistent: ClassVar[bool] = True
     intervals: Annotated[int, Meta(ge=1, le=16)] | None = None
     """Intervals of time and lens that share out a pixel's samples; none: as many as samples."""
+
+    def launches(self, simt: Simt) -> list[Work]:
+        """One kernel."""
+        return [empty_work("interval", simt)]
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -22,7 +22,7 @@ Not modelled
 """
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -59,6 +59,14 @@ REMARKS = {
 class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline micropolygon."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "quads": "pairs of a micropolygon and a sub-tile of a tile that pass the box test",
+        "tests": "sample tests in a tile",
+        "ste": "sample test efficiency in a tile",
+        "overdraw": "micropolygons that cover a pixel",
+        "atomics": "micropolygons that are put into a tile's bucket, an atomic each",
+    }
+    patches: ClassVar[bool] = True
     tile: TileSize = 8
     """Pixels on a side of a screen tile."""
     spp: Literal[1, 4, 16] = 1

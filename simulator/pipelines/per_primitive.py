@@ -13,7 +13,7 @@ Not modelled
 - The time of the host's waits between launches.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,11 @@ from tilestamp.simulator.stages.ru2016.vertex_shading import Samples, eye_space,
 class PerPrimitiveOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "race": "pixels that unprotected writes leave wrong",
+        "pixels wrong by the race": "the same",
+    }
+    textures: ClassVar[bool] = True
     cull_backfaces: bool = True
     """Leave out triangles that face away, as both published versions do."""
     race: bool = True

@@ -14,7 +14,7 @@ Not modelled
 - Whose views and GPUs the published times are: partly unknown, so their frames come out within a factor of two.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -40,6 +40,13 @@ from tilestamp.simulator.work import Work
 class TiledOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline tiled."""
 
+    maps: ClassVar[dict[str, str]] = {
+        "tests": "sample tests in a tile",
+        "ste": "sample test efficiency in a tile",
+        "atomics": "atomics on a tile's list",
+        "list length": "triangles in a tile's list",
+    }
+    textures: ClassVar[bool] = True
     tile: Annotated[int, Meta(ge=4, le=32)] = 8
     """Pixels on a side of a tile; a block has a thread for each."""
     cull_backfaces: bool = True

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.scenes.camera import Camera, LookAt, ModelToClip
 from tilestamp.simulator.scenes.library import with_views
 from tilestamp.simulator.scenes.scene import Scene
@@ -62,7 +63,8 @@ def _by_name(name: str, views: Mapping[str, Camera]) -> Camera:
     path, dot_json, keys = name.partition(".json")
     if not dot_json:
         known = ", ".join(views) or "none"
-        raise TilestampError(f"camera {name!r}: no such view (this scene has: {known}) and not a .json file")
+        near = did_you_mean(name, views)
+        raise TilestampError(f"camera {name!r}: no such view{near} (this scene has: {known}) and not a .json file")
     document = _load_json(Path(path + dot_json))
     try:
         for key in keys.split(":")[1:]:

@@ -23,6 +23,7 @@ from tilestamp.simulator.scenes.scene import Patches, Scene, clip_space_scene
 from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
 from tilestamp.simulator.scenes.stand_ins import NOT_SHIPPED, cut_like
 from tilestamp.simulator.scenes.subpatches import with_mesh
+from tilestamp.simulator.scenes.textured_mesh import with_texture
 from tilestamp.simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
@@ -41,7 +42,12 @@ STAND_INS = "stand-ins"  # under which a manifest names the models that are not 
 Z_UP = ("teapot", "teacup", "teaspoon", "killeroo")  # all others are taken to have y up
 
 
-def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: Kind = None) -> Scene:
+def load_scene(
+    source: str | Path | Scene,
+    scene_path: SearchPath = None,
+    kind: Kind = None,
+    texture: NDArray[np.uint8] | None = None,
+) -> Scene:
     """Load a scene by name or from a file.
 
     Parameters
@@ -53,6 +59,8 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
     kind : {"patches", "mesh"}, optional
         What to make of the file. By default patch files give patches, meshes a mesh, and an OBJ file of mostly quads
         gives both: patches by `approximate_catmull_clark`, and its polygons as a mesh.
+    texture : ndarray, (H, W, 4), uint8, optional
+        Laid over all triangles of a file by its texture coordinates, in place of the textures that it names.
 
     Returns
     -------
@@ -72,7 +80,7 @@ def load_scene(source: str | Path | Scene, scene_path: SearchPath = None, kind: 
     path = _resolve(source, scene_path)
     name = source if source in EMBEDDED else path.stem
     try:
-        return with_views(_read(name, path, kind))
+        return with_views(_read(name, path, kind, texture))
     except TilestampError:
         raise
     except MemoryError:
@@ -163,12 +171,12 @@ def _resolve(source: str, scene_path: SearchPath) -> Path:
     return found
 
 
-def _read(name: str, path: Path, kind: Kind) -> Scene:
+def _read(name: str, path: Path, kind: Kind, texture: NDArray[np.uint8] | None = None) -> Scene:
     if kind not in (None, "patches", "mesh"):
         raise TilestampError(f"kind must be 'patches' or 'mesh', not {kind!r}")
     suffix, notes = path.suffix.lower(), Notes()
     if suffix == ".obj":
-        scene = _from_obj(name, path, kind, notes)
+        scene = _from_obj(name, path, kind, notes, texture)
     elif suffix == ".bpt":
         scene = Scene(name, patches=read_bpt(path))
     elif kind == "patches":
@@ -179,6 +187,8 @@ def _read(name: str, path: Path, kind: Kind) -> Scene:
         scene = Scene(name, mesh=read_mesh(path, notes))
     if kind == "mesh":
         scene = replace(with_mesh(scene), patches=None)
+    if texture is not None:
+        scene = with_texture(scene, texture)
     _note_size(scene, path, notes)
     return replace(scene, note="; ".join(notes))
 
@@ -195,9 +205,9 @@ def _note_size(scene: Scene, path: Path, notes: Notes) -> None:
     notes.add_if(large, f"takes {size / 1e6:,.0f} MB of memory, {times:,.0f} times the file's size")
 
 
-def _from_obj(name: str, path: Path, kind: Kind, notes: Notes) -> Scene:
+def _from_obj(name: str, path: Path, kind: Kind, notes: Notes, texture: NDArray[np.uint8] | None = None) -> Scene:
     """Patches of a cage, the mesh of its polygons, or both; of an embedded cage the surface only."""
-    model = read_obj(path)
+    model = read_obj(path, texture)
     if kind == "patches" or path.parent == DATA:
         notes += model.notes
         return Scene(name, patches=patches_from_cage(cage_of(model, path)))

@@ -42,6 +42,10 @@ class Materials:
     textured: bool = False
     files: dict[Path, int] = field(default_factory=dict)
 
+    def cover(self, texture: NDArray[np.uint8]) -> None:
+        """Give all materials one texture in place of their own."""
+        self.texture_of[:], self.textures, self.textured = 0, (texture,), True
+
 
 def read_materials(model: Path, libraries: list[str], names: dict[str, int], notes: Notes) -> Materials:
     """Read the materials that a model uses, ``names``, from the libraries that its ``mtllib`` lines name."""

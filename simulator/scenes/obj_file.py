@@ -55,8 +55,11 @@ class ObjFile:
     notes: Notes = field(default_factory=Notes)
 
 
-def read_obj(path: str | Path) -> ObjFile:
-    """Read an OBJ file; raises TilestampError (``file:line``) where a line is broken or there is no face."""
+def read_obj(path: str | Path, texture: NDArray[np.uint8] | None = None) -> ObjFile:
+    """Read an OBJ file; raises TilestampError (``file:line``) where a line is broken or there is no face.
+
+    A ``texture``, (H, W, 4) uint8, is laid over all faces in place of those of the materials.
+    """
     path, notes = Path(path), Notes()
     found = scan(path, plain_text(read_bytes(path)))
     positions, colors = _vertices(found, notes)
@@ -69,6 +72,8 @@ def read_obj(path: str | Path) -> ObjFile:
         raise TilestampError(f"{path}: the model has no faces")
     materials, names, libraries = _statements(found, notes)
     surfaces = read_materials(path, libraries, names, notes)
+    if texture is not None:
+        surfaces.cover(texture)
     corners = _resolved(found, sizes, 0, Row.V)
     coordinate_of = normal_of = np.broadcast_to(np.int64(-1), corners.shape)
     if surfaces.textured:

@@ -5,6 +5,7 @@ but without (or with NaN) coordinates, shows its base colour; triangles with a N
 Texels and colours are used as they are stored, as both originals do: no sRGB conversion.
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -64,6 +65,21 @@ def geometry(scene: Scene) -> Geometry:
         mapped = known[triangles].all(axis=1)
         textures = np.where(mapped, mesh.texture_ids[ids], np.int32(-1)).astype(np.int32)
     return Geometry(positions, triangles, _clean(colors), _clean(normals), _clean(uvs), textures, ids)
+
+
+def with_texture(scene: Scene, image: NDArray[np.uint8]) -> Scene:
+    """Lay one image, (H, W, 4) uint8, over all triangles of a mesh, by its coordinates.
+
+    Raises
+    ------
+    TilestampError
+        The mesh has no texture coordinates.
+    """
+    mesh = scene.mesh
+    if mesh is None or mesh.uvs is None or not np.isfinite(mesh.uvs).any():
+        raise TilestampError(f"{scene.name} has no texture coordinates, by which a texture could be laid on it")
+    ids = np.zeros(len(mesh.triangles), np.int32)
+    return dataclasses.replace(scene, mesh=dataclasses.replace(mesh, textures=(image,), texture_ids=ids))
 
 
 def draws(scene: Scene, mesh: Geometry) -> NDArray[np.int64]:

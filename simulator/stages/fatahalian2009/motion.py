@@ -7,6 +7,7 @@ the lens position (Fatahalian et al. 2009; Cook et al. 1987). A sample is a plac
 point of the unit disc. The pattern of samples is a tile that repeats over the screen.
 """
 
+from dataclasses import replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -184,16 +185,19 @@ def motion_work(
         *more,
         Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
     )
+    return replace(empty_work(kernel, simt), table=table, streams=streams, atomic_requests=samples.requests)
+
+
+def empty_work(kernel: str, simt: Simt) -> Work:
+    """Launch of either algorithm, without rows."""
     return Work(
         stage=kernel,
         kernel=kernel,
         events=MotionEvent,
-        table=table,
+        table=np.zeros((0, len(MotionEvent)), np.int64),
         grid=blocks(simt, WARPS),
         block=WARPS * simt.warp,
         dispatch="warp_queue",
-        streams=streams,
-        atomic_requests=samples.requests,
     )
 
 

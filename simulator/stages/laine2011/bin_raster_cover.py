@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.models.simt import Simt
 
 WARP = 32  # lanes; the original's ballots and its masks of 32 bits know no other width
 HEADER_BYTES = 16  # six int16 coordinates and one word
@@ -182,6 +182,6 @@ def transaction_bytes(simt: Simt, stage: str) -> int:
     TilestampError
         Where the machine has no ballots over warps of 32 (compute capability below 2.0).
     """
-    if simt.warp != WARP or simt.coalescing == Coalescing.HALF_WARP_SEGMENTS:
+    if not simt.votes:
         raise TilestampError(f"{stage}: cudaraster votes over warps of 32 and needs compute capability 2.0 or later")
     return int(smallest_transaction_bytes(int(simt.coalescing)))

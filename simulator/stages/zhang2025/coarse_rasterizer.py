@@ -120,10 +120,15 @@ def coarse_rasterizer(
         Stream("setup", "load", 160 * int(total[CoarseRasterizerEvent.WARP_LANES]), len(data.ids) * SETUP_BYTES),
         Stream("tile_queue", "store", int(total[CoarseRasterizerEvent.STORE_BYTES]), 4 * len(entries)),
     )
-    kernel = "CoarseRasterizer" if unrolled else "CoarseRasterizer_before"
-    work = Work(
+    work = coarse_work(events, streams, unrolled=unrolled)
+    return StageResult(TileQueues(starts, entries, columns * TILES_A_ROW), (work,))
+
+
+def coarse_work(events: NDArray[np.int64], streams: tuple[Stream, ...] = (), *, unrolled: bool) -> Work:
+    """Launch of the stage."""
+    return Work(
         stage="CoarseRasterizer",
-        kernel=kernel,
+        kernel="CoarseRasterizer" if unrolled else "CoarseRasterizer_before",
         events=CoarseRasterizerEvent,
         table=events,
         grid=len(events),
@@ -131,7 +136,6 @@ def coarse_rasterizer(
         shared_bytes=SHARED_BYTES,
         streams=streams,
     )
-    return StageResult(TileQueues(starts, entries, columns * TILES_A_ROW), (work,))
 
 
 def _fills(bins: BinQueues, columns: int, rows: int) -> NDArray[np.int64]:
