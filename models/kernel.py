@@ -6,23 +6,16 @@ kernels that it calls, in whatever module, and the constants and enums that it r
 whose code it changes, and no other; two checkouts share what they have in common.
 """
 
-import contextlib
-import os
-import pickle
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Protocol, overload
 
-from llvmlite.binding import parse_assembly, parse_bitcode
-from numba import njit, types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
-from numba.core.codegen import JITCodeLibrary
-from numba.core.runtime import rtsys
+from numba import config
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 
-from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling
-from tilestamp.models.kernel_digest import kernel_digest
-
-_UNREADABLE = (OSError, EOFError, AttributeError, ImportError, KeyError, pickle.UnpicklingError)
+from tilestamp.models.kernel_cache import KernelCache
+from tilestamp.models.kernel_library import for_kernels, nested, outermost
 
 
 class Kernel(Protocol):
@@ -54,138 +47,36 @@ def kernel(
     """
 
     def compiled(function: Callable[..., Any]) -> Kernel:
-        dispatcher: Any = njit(nogil=True, error_model=error_model, _nrt=not lent)(function)
-        if hasattr(dispatcher, "py_func"):  # not where NUMBA_DISABLE_JIT is set
-            dispatcher._cache = _KernelCache(dispatcher)  # noqa: SLF001 - numba has no public way to name a cache
-        return dispatcher  # type: ignore[no-any-return]
+        if config.DISABLE_JIT:
+            return function  # type: ignore[return-value]  # which is its own py_func
+        options = {"nopython": True, "nogil": True, "error_model": error_model, "boundscheck": None, "_nrt": not lent}
+        return _Dispatcher(function, targetoptions=options)
 
     return compiled if function is None else compiled(function)
 
 
-class _Locator(_CacheLocator):  # type: ignore[misc]  # numba has no types
-    """Where one kernel is kept: all in one folder, the digest in the file's name."""
+class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
+    """Compiles a kernel for Python, or, called by another kernel, for kernels alone."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._py_file = function.__code__.co_filename  # numba asks for it when it cannot cache
-        self._digest = kernel_digest(function)
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        self._cache = KernelCache(self)  # numba has no public way to name a cache
 
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        return str(cache_folder())
+    def add_overload(self, cres: Any) -> None:
+        """Keep what was compiled, where Python finds it if it may call it."""
+        if for_kernels(cres.library):
+            self.overloads[tuple(cres.signature.args)] = cres
+        else:
+            super().add_overload(cres)
 
-    def get_source_stamp(self) -> str:
-        """Nothing more than the file's name says."""
-        return self._digest
-
-    def get_disambiguator(self) -> str:
-        """Return what the file's name ends with."""
-        return self._digest
-
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], _py_file: str) -> "_Locator":
-        """Find the place of a kernel."""
-        return cls(py_func)
-
-
-class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
-    """As Numba writes compiled functions, elsewhere."""
-
-    _locator_classes = (_Locator,)
-
-    def reduce(self, cres: Any) -> Any:
-        """Serialize, without the environments of Numba's own functions that hold nothing: each loads its module."""
-        *all_else, environments = super().reduce(cres)
-        return (*all_else, [each for each in environments if each.consts or not _of_numba(each)])
-
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Load the machine code alone; the bitcode waits until another kernel is compiled against this one."""
-        (name, kind, (machine_code, bitcode)), described, *rest = payload
-        engine = target_context.codegen()._engine  # noqa: SLF001
-        engine._defined_symbols.add(described.llvm_cpython_wrapper_name)  # noqa: SLF001 - by which it is found
-        nothing = parse_assembly("").as_bitcode()
-        found = super().rebuild(target_context, ((name, kind, (machine_code, nothing)), described, *rest))
-        found.library.__class__ = _LoadedLibrary
-        found.library.bitcode = bitcode
-        return found
-
-
-class _LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Machine code from disk, with bitcode that few need: to read it takes as long as to load the machine code."""
-
-    bitcode: bytes | None
-
-    def _get_module_for_linking(self) -> Any:
-        if self.bitcode is not None:
-            self._shared_module, self.bitcode = parse_bitcode(self.bitcode), None
-            self._codegen._engine._load_defined_symbols(self._shared_module)  # noqa: SLF001
-        return super()._get_module_for_linking()
-
-
-def _of_numba(environment: Any) -> bool:
-    return str(environment.globals["__name__"]).startswith("numba.")
-
-
-class _KernelCache(FunctionCache):  # type: ignore[misc]
-    """The cache of one kernel; it is looked for at the first call, when all that the kernel reaches is defined."""
-
-    _impl_class = _Impl
-
-    def __init__(self, dispatcher: Any) -> None:
-        self._dispatcher = dispatcher
-        self._found = False
-
-    def _find(self) -> None:
-        if not self._found:
-            super().__init__(self._dispatcher.py_func)
-            self._found = True
-
-    @property
-    def cache_path(self) -> str:
-        """The folder."""
-        self._find()
-        return str(self._cache_path)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load what was compiled for the signature, None if it was not; a file that cannot be read is none.
-
-        Numba would first load all that it can compile (``target_context.refresh``), which takes longer than a small
-        frame: what is on disk needs its memory manager alone.
-        """
-        self._find()
-        rtsys.initialize(target_context)
-        index = self._cache_file._index_path  # noqa: SLF001
-        try:
-            found = self._load_overload(sig, target_context)
-            if found is not None:
-                os.utime(index)  # the mark by which pruning sees that it is in use
-        except _UNREADABLE:
-            found = None
-            with contextlib.suppress(OSError):
-                Path(index).unlink()
-        if found is None:
-            target_context.refresh()
-            note_compiling(self._dispatcher.py_func)
-        return found
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled; where nothing can be written it is not kept."""
-        self._find()
-        with contextlib.suppress(OSError):
-            super().save_overload(sig, data)
-        note_compiled()
-
-    def flush(self) -> None:
-        """Forget what was compiled."""
-        self._find()
-        super().flush()
-
-    def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """As Numba's, with the options and with the names and order of the fields of what is passed in."""
-        options = sorted((name, str(value)) for name, value in self._dispatcher.targetoptions.items())
-        return (*super()._index_key(sig, codegen), str(options), _fields(sig))
-
-
-def _fields(sig: Any) -> str:
-    """Fields of the named tuples among some types: a kernel reads a field by its place."""
-    named = [(str(t), t.fields, _fields(t.types)) for t in sig if isinstance(t, types.BaseNamedTuple)]
-    return str(named) if named else ""
+    def compile(self, sig: Any) -> Any:
+        """Compile it, or load it."""
+        with global_compiler_lock:
+            if nested():
+                return super().compile(sig)
+            types_given = tuple(normalize_signature(sig)[0])
+            known = self.overloads.get(types_given)
+            if known is not None and for_kernels(known.library):
+                del self.overloads[types_given]
+            with outermost(self.targetctx.codegen()):
+                return super().compile(sig)

@@ -17,6 +17,8 @@ PACKAGE = Path(tilestamp.__file__).parent
 NUMBERS = {"int", "bool", "float", "Any"}
 FOREIGN = {  # what they take belongs to a library without types
     "models/kernel.py": "numba",
+    "models/kernel_cache.py": "numba",
+    "models/kernel_library.py": "numba",
     "models/kernel_digest.py": "numba",
     "simulator/stages/borrow.py": "numba",
     "simulator/stages/laine2011/exact.py": "numba",

@@ -124,6 +124,38 @@ def test_an_edit_that_no_kernel_sees_compiles_nothing(project, monkeypatch, file
 
 
 @compiled
+def test_a_helper_is_compiled_for_its_callers_alone_until_python_calls_it(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    helper = importlib.import_module("kernel_project.helper")
+    assert [kept.library.for_python for kept in helper.scaled.overloads.values()] == [False]
+    assert helper.scaled(5) == 10
+    assert [kept.library.for_python for kept in helper.scaled.overloads.values()] == [True]
+
+
+@compiled
+def test_what_a_helper_raises_reaches_python_from_the_cache_too(project, monkeypatch):
+    checked = "    if x > 4:\n        raise ValueError('too large')\n    return"
+    _edit(project / "helper.py", "    return", checked)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="too large"):
+            _kernels_compiled(project, monkeypatch)
+
+
+@compiled
+def test_helpers_from_the_cache_and_compiled_now_make_arrays(project, monkeypatch):
+    made = "import numpy as np\nfrom tilestamp.models.kernel import kernel\n\n"
+    made += "@kernel\ndef scaled(x):\n    return np.full(x, 2.0)\n"
+    (project / "helper.py").write_text(made)
+    _edit(project / "stage.py", "scaled(x) + 1", "scaled(x)")
+    _kernels_compiled(project, monkeypatch)
+    _edit(project / "stage.py", "return scaled(x)", "return scaled(x) + np.full(x, 3.0)")
+    _edit(project / "stage.py", "from tilestamp", "import numpy as np\nfrom tilestamp")
+    answer, compiled_now = _kernels_compiled(project, monkeypatch)
+    assert answer.tolist() == [5.0] * 5
+    assert compiled_now == ["stage.stage"]
+
+
+@compiled
 def test_going_back_to_what_was_compiled_before_compiles_nothing(project, monkeypatch):
     _kernels_compiled(project, monkeypatch)
     _edit(project / "deepest.py", "FACTOR = 2", "FACTOR = 7")

@@ -8,7 +8,7 @@ from tests.mutation.mutants import ROOT
 from tilestamp.simulator.pipelines import pipeline_names
 
 LEDGER = "tests/test_ledger.py"
-PLUMBING = ("kernel", "kernel_digest", "compile_cache", "used", "errors")  # of models: no rule of a machine
+PLUMBING = ("kernel", "kernel_cache", "kernel_library", "kernel_digest", "compile_cache", "used", "errors")  # no rules
 SLOW = {"test_architecture", "test_frontier_methods", "test_silicon", "test_stability_overflow"}
 PIPELINE_TESTS = {
     "ru2016": ("tests/test_textured_mesh.py",),

@@ -1,0 +1,158 @@
+"""What a kernel calls is optimised and made machine code once, in the kernels that Python calls.
+
+Of every function that it compiles, each helper and each of its own, Numba makes machine code and two wrappers for
+Python, and optimises it anew in all that call it. Here such a function stays as it was lowered (``KernelLibrary``)
+until the outermost kernel gathers what it reaches, each once, optimises that together and makes machine code of it.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from llvmlite.binding import parse_bitcode
+from numba.core import event
+from numba.core.codegen import JITCodeLibrary
+from numba.core.cpu import CPUContext
+from numba.core.environment import lookup_environment
+
+_outermost: list["_Nesting"] = []  # of the kernel that is being compiled for Python, under Numba's compiler lock
+
+
+class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
+    """Code of one function, without what it calls until it is finalised."""
+
+    for_python = False
+    _linking_libraries: list[Any]
+    _own: Any = None
+
+    @classmethod
+    def from_bitcode(cls, codegen: Any, name: str, bitcode: bytes) -> "KernelLibrary":
+        """Take what ``serialize`` gave."""
+        library = cls(codegen, name)
+        library._final_module = parse_bitcode(bitcode)
+        return library
+
+    def serialize(self) -> tuple[str, str, bytes]:
+        """Its bitcode, with all that it calls."""
+        whole = self._own_module().clone()
+        own = set(_defined(whole))
+        self._link_into(whole)
+        for name in _defined(whole):
+            if name not in own:  # names are unique in this process alone
+                whole.get_function(name).linkage = "internal"
+        return self.name, "bitcode", whole.as_bitcode()
+
+    def add_linking_library(self, library: Any) -> None:
+        """Note what is called, finalised or not."""
+        self._linking_libraries.append(library)
+
+    @property
+    def has_dynamic_globals(self) -> bool:
+        """No kernel has any: what is not known when it is compiled is an argument."""
+        return False
+
+    def finalize(self) -> None:
+        """Gather what is reached, optimise it together and make machine code."""
+        self._link_into(self._final_module)
+        self._linking_libraries = []
+        super().finalize()
+        for environment in environments(self._final_module):
+            self._codegen.set_env(environment.env_name, environment)
+
+    def _link_into(self, module: Any) -> None:
+        """Add what is reached, each function once."""
+        seen, left = {id(self)}, list(self._linking_libraries)
+        while left:
+            library = left.pop(0)
+            if id(library) in seen:
+                continue
+            seen.add(id(library))
+            self._reload_init.update(library._reload_init)  # noqa: SLF001
+            if isinstance(library, KernelLibrary) and not library._finalized:  # noqa: SLF001
+                left += library._linking_libraries  # noqa: SLF001
+                module.link_in(library._own_module(), preserve=True)  # noqa: SLF001
+            else:
+                module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001
+
+    def _own_module(self) -> Any:
+        """Its code as others may link it, several times."""
+        if self._own is None:
+            self._own = self._final_module.clone()
+            for function in self._own.functions:
+                if not function.is_declaration and function.linkage.name == "external":
+                    function.linkage = "linkonce_odr"
+        return self._own
+
+
+def _defined(module: Any) -> list[str]:
+    return [function.name for function in module.functions if not function.is_declaration]
+
+
+def environments(module: Any) -> list[Any]:
+    """What functions of a module need of Python."""
+    names = [variable.name for variable in module.global_variables if variable.name.startswith("_ZN08NumbaEnv")]
+    return [found for found in map(lookup_environment, names) if found is not None]
+
+
+def for_kernels(library: Any) -> bool:
+    """Whether what was compiled can be called by kernels alone."""
+    return isinstance(library, KernelLibrary) and not library.for_python
+
+
+def nested() -> bool:
+    """Whether what is compiled or loaded now is for another kernel."""
+    return bool(_outermost) and _outermost[-1].depth > 0
+
+
+class _Nesting(event.Listener):  # type: ignore[misc]
+    """How many functions are being compiled, each for the one before."""
+
+    depth = 0
+
+    def on_start(self, _event: Any) -> None:
+        self.depth += 1
+
+    def on_end(self, _event: Any) -> None:
+        self.depth -= 1
+
+
+def no_address() -> Any:
+    """Stand for the address of a function that has none: Numba wants a built-in function, another for each."""
+    return [].append
+
+
+@contextmanager
+def outermost(codegen: Any) -> Iterator[None]:
+    """Compile a kernel for Python, and what it calls for kernels alone; under Numba's compiler lock."""
+    nesting = _Nesting()
+    kept = {
+        name: getattr(CPUContext, name) for name in ("get_executable", "create_cpython_wrapper", "create_cfunc_wrapper")
+    }
+
+    def get_executable(context: Any, library: Any, *described: Any) -> Any:
+        if nesting.depth > 1:
+            return no_address()
+        library.for_python = True
+        return kept["get_executable"](context, library, *described)
+
+    def create_cpython_wrapper(context: Any, *described: Any, **options: Any) -> None:
+        if nesting.depth == 1:
+            kept["create_cpython_wrapper"](context, *described, **options)
+
+    def create_cfunc_wrapper(*_described: Any, **_options: Any) -> None:
+        """For C, which calls none."""
+
+    library_class = codegen._library_class  # noqa: SLF001
+    event.register("numba:compile", nesting)
+    _outermost.append(nesting)
+    codegen._library_class = KernelLibrary  # noqa: SLF001
+    for made in (get_executable, create_cpython_wrapper, create_cfunc_wrapper):
+        setattr(CPUContext, made.__name__, made)
+    try:
+        yield
+    finally:
+        for name, method in kept.items():
+            setattr(CPUContext, name, method)
+        codegen._library_class = library_class  # noqa: SLF001
+        _outermost.pop()
+        event.unregister("numba:compile", nesting)
