@@ -8,7 +8,7 @@ import pytest
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.validation.machine_file import busy, machine_file
 from tilestamp.experiments.validation.measuring import CLASSES, Number
-from tilestamp.experiments.validation.measuring_l2 import kept, lines
+from tilestamp.experiments.validation.measuring_l2 import fetch_bytes, gap_lines, kept, lines
 from tilestamp.experiments.validation.measuring_sm import SENT, between
 from tilestamp.models.machine import load_machine
 
@@ -95,3 +95,15 @@ def test_what_one_sm_sends_is_apart_from_what_the_chip_takes():
         assert getattr(getattr(H200, section), name) > 0
         assert H200.provenance[key][0] == "measured"
     assert H200.atomics.sm_requests_per_clock * H200.sm.count > H200.atomics.requests_per_clock
+
+
+@pytest.mark.parametrize(("other_us", "bytes_"), [(119.0, 64), (62.0, 32)])
+def test_a_miss_that_brings_in_two_sectors_takes_as_long_for_every_other_one(other_us, bytes_):
+    found = fetch_bytes(120.0, other_us)
+    assert (found.value, type(found.value)) == (bytes_, int)
+
+
+def test_lines_with_gaps_take_what_is_not_the_fetch():
+    """1000 lines are left of 640,000 bytes: 50 us, of which each fetches for 0.01: 25 a microsecond of 100 clocks."""
+    assert gap_lines(10.0, 60.0, 640_000, 0.01, 100.0).value == pytest.approx(0.25)
+    assert gap_lines(10.0, 10.0, 640_000, 0.01, 100.0).value == 0.0

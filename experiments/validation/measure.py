@@ -32,7 +32,7 @@ def measure() -> Iterator[Number]:
     for found in bandwidths(sms, frequency.value):
         dram = found.value if found.key == "memory.dram_gb_per_s" else dram
         yield found
-    yield from l2(sms, dram)
+    yield from l2(sms, dram, frequency.value)
     yield from atomics(sms, frequency.value)
     yield from one_sm(sms)
     yield from launches()
