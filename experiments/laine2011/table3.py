@@ -11,7 +11,7 @@ from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.scenes.search_path import find_scene
 from tilestamp.simulator.simulation import simulate
@@ -180,5 +180,5 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
         published="published",
         status="status",
         title=title,
-        y_label="share [%]",
+        unit="share [%]",
     )
