@@ -1,5 +1,7 @@
 """Plots: what is published is drawn, what lies on something else is said, and files say what they show."""
 
+from itertools import pairwise
+
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
@@ -70,7 +72,7 @@ def test_no_ticks_overlap(scale, tmp_path):
     low, high = drawn.get_window_extent().x0, drawn.get_window_extent().x1
     shown = [box for box in boxes if low <= (box.x0 + box.x1) / 2 <= high]
     assert len(shown) > 1
-    assert all(left.x1 < right.x0 for left, right in zip(shown, shown[1:], strict=False))
+    assert all(left.x1 < right.x0 for left, right in pairwise(shown))
 
 
 def test_no_legend_lies_on_the_axes():
