@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tilestamp.reports.style import PALETTE, figure
+from tilestamp.reports.style import PALETTE, figure, legend_beside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,4 +46,4 @@ def fitted_lines(
         )
         axes.set(xlabel=labels[0], ylabel=labels[1])
         axes.set_ylim(bottom=0)
-        axes.legend()
+        legend_beside(axes)

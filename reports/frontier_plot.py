@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tilestamp.reports.style import PALETTE, figure
+from tilestamp.reports.style import PALETTE, figure, legend_beside, plain_ticks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,26 +70,14 @@ def frontier(
             axes.axhline(guide, color="#999999", linestyle=":", linewidth=1.2)
         axes.set(xlabel=xlabel, ylabel=ylabel, xscale="log", yscale="log")
         axes.margins(x=0.15, y=0.1)
-        _ticks(axes)
+        plain_ticks(axes)
         if none.any():
             axes.annotate("no error", (0.005, foot), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
         if label:
             _label(axes, shown)
-        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        legend_beside(axes)
     drawn: Axes = axes
     return drawn
-
-
-def _ticks(axes: "Axes") -> None:
-    """Plain numbers at the decades, and at 2 and 5 where there are few decades."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-        decades = np.log10(high / low)
-        steps = (1.0,) if decades > 3 else (1.0, 2.0, 5.0) if decades > 0.7 else tuple(np.arange(1.0, 10.0, 0.5))
-        axis.set_major_locator(LogLocator(subs=steps))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())
 
 
 def _steps(axes: "Axes", front: "pd.DataFrame") -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-COLUMNS = (5, 4, 3)  # whichever leaves the fewest places empty
+COLUMNS = 3  # panels side by side: more, and their texts cannot be read on a page
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "black", "linewidth": 0.9},
     {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
@@ -50,20 +50,20 @@ def panels(
     names = list(dict.fromkeys(table[panel]))
     groups = list(dict.fromkeys(table[group]))
     places = len(names) + 1  # the legend has one of its own
-    columns = min(COLUMNS, key=lambda count: -places % count)
+    columns = min(COLUMNS, places)
     rows = -(-places // columns)
-    size = (3.5 * columns, 3.1 * rows + 0.4)
+    size = (3.0 * columns, 2.5 * rows + 0.4)
     with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
             _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, (front, second))
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
         for axes in grid[:, 0]:
-            axes.set_ylabel(y_label, fontsize=8)
+            axes.set_ylabel(y_label, fontsize=9)
         for axes in grid.flat[max(len(names) - columns, 0) : len(names)]:
-            axes.set_xlabel(x_label, fontsize=8)
+            axes.set_xlabel(x_label, fontsize=9)
         handles = [*(_mark(k) for k in range(len(groups))), *map(_line, LINES)]
-        grid.flat[len(names)].legend(handles, [*groups, "front", "front of software"], fontsize=8, loc="upper left")
+        grid.flat[len(names)].legend(handles, [*groups, "front", "front of software"], fontsize=9, loc="upper left")
 
 
 def _panel(
@@ -94,8 +94,8 @@ def _panel(
     else:
         axes.set_ylim(-0.03 * max(heights.max(), 1e-6), 1.2 * max(heights.max(), 1e-6))
     axes.minorticks_off()
-    axes.set_title(name, fontsize=9)
-    axes.tick_params(labelsize=7)
+    axes.set_title(name, fontsize=10)
+    axes.tick_params(labelsize=9)
     if (rows[y] <= 0).any() and foot > 0.0:
         axes.annotate("none", (0.01, foot), xycoords=("axes fraction", "data"), fontsize=7, va="bottom")
 

@@ -1,18 +1,21 @@
-"""Plots from plain tables. Each takes a DataFrame and column names, and writes one PNG."""
+"""Lines from a plain table, with what is published as hollow points, and words where lines lie on each other."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from tilestamp.reports.style import PALETTE, PUBLISHED, figure
+import numpy as np
+
+from tilestamp.reports.style import PALETTE, PUBLISHED, figure, legend_beside, plain_ticks
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from tilestamp.reports.style import Into
 
-HATCHES = {"partly fitted": "//", "fitted": "//////"}  # of bars, by status
-MOST_INSIDE = 4  # series whose legend stands inside the axes; that of more would hide lines
+MARKERS = "os^vDPX"
+SAME = 0.008  # of the axis, about the width of a line: lines that are nowhere further apart are drawn as one
 
 
 def lines(
@@ -28,8 +31,11 @@ def lines(
     published: str | None = None,
     log_x: bool = False,
     log_y: bool = False,
+    said: Sequence[tuple[float, float, str]] = (),
 ) -> "Axes":
     """Draw one line for each value of ``by``; column ``published`` as hollow diamonds of the line's colour.
+
+    Lines that coincide everywhere are one line, and the legend says so; one that is zero throughout says that, too.
 
     Parameters
     ----------
@@ -39,73 +45,63 @@ def lines(
         Where it goes (``tilestamp.reports.style``).
     x, y, by, published : str
         Columns.
+    said : sequence of (x, y, text)
+        Words beside points.
     """
     with figure(into, title) as axes:
-        for color, (name, group) in zip(PALETTE * 4, table.groupby(by, sort=False), strict=False):
-            rows = group.sort_values(x)
-            axes.plot(rows[x], rows[y], marker="o", markersize=4, color=color, label=str(name))
+        groups = {str(name): rows.sort_values(x) for name, rows in table.groupby(by, sort=False)}
+        for index, (names, rows) in enumerate((groups if published else _distinct(groups, x, y, log=log_y)).items()):
+            color = PALETTE[index % len(PALETTE)]
+            style: dict[str, Any] = {
+                "marker": MARKERS[index % len(MARKERS)],
+                "markersize": 5,
+                "markerfacecolor": "none",
+            }
+            none = ": 0 throughout" if (rows[y] == 0).all() else ""
+            axes.plot(
+                rows[x], rows[y], color=color, label=f"{names}{none}", clip_on=bool((rows[y] != 0).any()), **style
+            )
             if published is not None and rows[published].notna().any():
                 axes.plot(rows[x], rows[published], **{**PUBLISHED, "markeredgecolor": color})
         if published is not None:
             axes.plot([], [], label="published", **PUBLISHED)
+        for across, up, text in said:
+            axes.annotate(text, (across, up), (8, -4), textcoords="offset points", fontsize=8)
         axes.set(xlabel=x_label, ylabel=y_label)
         axes.set_xscale("log" if log_x else "linear")
         axes.set_yscale("log" if log_y else "linear")
         if not log_y:
             axes.set_ylim(bottom=0)
-        if len(axes.get_legend_handles_labels()[0]) > MOST_INSIDE:
-            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        else:
-            axes.legend()
+        plain_ticks(axes)
+        legend_beside(axes)
     drawn: Axes = axes
     return drawn
 
 
-def paired_bars(
-    table: "pd.DataFrame",
-    path: Path,
-    *,
-    label: str,
-    ours: str,
-    published: str,
-    status: str,
-    title: str,
-    y_label: str,
-    known: str = "published",
-) -> None:
-    """Draw a bar for each row, solid where predicted, hatched where fitted; the published value is a diamond.
-
-    Parameters
-    ----------
-    table : DataFrame
-        A row a cell; columns ``label``, ``ours``, ``published``, ``status``.
-    path : Path
-        PNG to write.
-    known : str
-        What the diamonds are: published, or measured.
-    """
-    with figure(path, title, figsize=(max(7.2, 0.42 * len(table)), 4.4)) as axes:
-        positions = range(len(table))
-        bars = axes.bar(positions, table[ours], color=PALETTE[0], width=0.62)
-        for bar, kind in zip(bars, table[status], strict=True):
-            if kind in HATCHES:
-                bar.set(facecolor="white", edgecolor=PALETTE[0], hatch=HATCHES[kind])
-        (points,) = axes.plot(positions, table[published], **PUBLISHED)
-        kinds = {known: points} | dict(zip(table[status], bars, strict=True))
-        axes.set_xticks(list(positions), table[label], rotation=45, ha="right", fontsize=8)
-        axes.set(ylabel=y_label)
-        axes.legend(kinds.values(), kinds.keys())
+def _distinct(groups: "dict[str, pd.DataFrame]", x: str, y: str, *, log: bool) -> "dict[str, pd.DataFrame]":
+    """Groups that differ; those that coincide under one name."""
+    heights = {name: _heights(rows[y], log=log) for name, rows in groups.items()}
+    every = np.concatenate(list(heights.values()))
+    near = SAME * np.ptp(every[np.isfinite(every)]) if np.isfinite(every).any() else 0.0
+    kept: list[list[str]] = []
+    for name, rows in groups.items():
+        for names in kept:
+            if list(groups[names[0]][x]) == list(rows[x]) and _coincide(heights[names[0]], heights[name], near):
+                names.append(name)
+                break
+        else:
+            kept.append([name])
+    return {" = ".join(names): groups[names[0]] for names in kept}
 
 
-def stacked_bars(table: "pd.DataFrame", path: Path, *, title: str, y_label: str) -> None:
-    """Draw a stacked bar for each row of ``table``, a segment for each column."""
-    with figure(path, title, figsize=(max(7.2, 0.9 * len(table)), 4.4)) as axes:
-        base = [0.0] * len(table)
-        for color, column in zip(PALETTE * 3, table.columns, strict=False):
-            heights = table[column].fillna(0.0).tolist()
-            axes.bar(range(len(table)), heights, bottom=base, color=color, label=str(column), width=0.62)
-            base = [low + high for low, high in zip(base, heights, strict=True)]
-        axes.set_xticks(range(len(table)), [str(name) for name in table.index], rotation=30, ha="right")
-        axes.margins(y=0.08)
-        axes.set(ylabel=y_label)
-        axes.legend(fontsize=8)
+def _heights(values: "pd.Series[float]", *, log: bool) -> "NDArray[np.float64]":
+    """Values as high as they are drawn."""
+    numbers: NDArray[np.float64] = values.to_numpy(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        heights: NDArray[np.float64] = np.log10(numbers) if log else numbers
+    return heights
+
+
+def _coincide(one: "NDArray[np.float64]", other: "NDArray[np.float64]", near: float) -> bool:
+    """Whether two lines cannot be told apart."""
+    return bool(np.allclose(one, other, rtol=0.0, atol=near, equal_nan=True))

@@ -89,4 +89,4 @@ def stability() -> Result:
 
 
 def _plot(path: Path) -> None:
-    Image.fromarray(np.full((60, 80, 3), 128, np.uint8)).save(path)
+    Image.fromarray(np.full((60, 80, 3), 128, np.uint8)).save(path.with_suffix(".png"))

@@ -118,13 +118,22 @@ def _notes(table: "pd.DataFrame") -> list[str]:
 
 
 def _draw(table: "pd.DataFrame", path: "Path") -> None:
+    table = table.assign(thousands=table["patches"] / 1000)
     lines(
-        table.assign(thousands=table["patches"] / 1000),
+        table,
         path,
         x="thousands",
         y="ms",
         by="tile",
-        title="Frame time by tile size and zoom, GTX 280 (model)",
+        title=f"Frame time by tile size and zoom, GTX 280; published order: {PUBLISHED_ORDER}",
         x_label="patches rasterized [thousands]",
         y_label="time of a frame [ms]",
+        said=[_order_said(rows, int(zoom)) for zoom, rows in table.groupby("zoom")],
     )
+
+
+def _order_said(rows: "pd.DataFrame", zoom: int) -> tuple[float, float, str]:
+    """Whether the order at a zoom level is as published, above its slowest tile."""
+    top = rows.loc[rows["ms"].idxmax()]
+    ours = " < ".join(rows.sort_values("ms")["tile"])
+    return top["thousands"], top["ms"], f"zoom {zoom}: {'as published' if ours == PUBLISHED_ORDER else ours}"

@@ -7,7 +7,7 @@ from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -93,5 +93,5 @@ def _draw(cells: Sequence[Cell], path: "Path") -> None:
         published="published",
         status="status",
         title="Total time of a frame, GTX 280",
-        y_label="time [ms]",
+        unit="time [ms]",
     )

@@ -14,7 +14,7 @@ from tilestamp.experiments.eisenacher2010.frames import (
 )
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
-from tilestamp.reports.plots import stacked_bars
+from tilestamp.reports.bars import stacked_bars
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 from tilestamp.simulator.work import Work
 
@@ -31,6 +31,12 @@ SAMPLING_MS = {1: 46.2, 4: 110.6, 16: 261.4}
 TOTAL_MS = {1: 77.0, 4: 140.6, 16: 290.2}
 HYBRID_SAMPLING_MS, HYBRID_TOTAL_MS = 19.0, 37.2
 STAGES = ("system overhead", "bound and split", "evaluate grid", "count", "sort", "setup")  # the same at any spp
+SHARED_MS = {"overhead": OVERHEAD.number, "dice": DICE_MS}
+SOFTWARE_MS = {"bound_and_split": SPLIT_MS, "count": COUNT_MS, "sort": SORT_MS, "setup": SETUP_MS}
+PUBLISHED_MS = {
+    **{f"{spp} spp": {**SHARED_MS, **SOFTWARE_MS, "sampling": ms} for spp, ms in SAMPLING_MS.items()},
+    "hybrid": {**SHARED_MS, "bound_and_split": HYBRID_SPLIT_MS, "hardware": HYBRID_SAMPLING_MS},
+}
 STARTED = (E.PIXEL_WARPS, E.PIXEL_LANES, E.GRIDS, E.BATCHES, E.BATCH_WARPS, E.GATHER_WARPS, E.GATHER_LANES)
 MOVED = (E.BARRIERS, E.LOAD_TRANSACTIONS, E.LOAD_BYTES, E.STORE_TRANSACTIONS, E.STORE_BYTES)
 
@@ -159,4 +165,5 @@ def _draw(stages: dict[str, dict[str, float]], path: "Path") -> None:
     import pandas as pd
 
     table: pd.DataFrame = pd.DataFrame(stages).T.fillna(0.0)
-    stacked_bars(table, path, title="Time of each stage, killeroo on a GTX 280 (model)", y_label="time [ms]")
+    known = pd.DataFrame(PUBLISHED_MS).T
+    stacked_bars(table, path, title="Time of each stage, killeroo on a GTX 280", unit="time [ms]", published=known)

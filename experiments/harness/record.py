@@ -11,6 +11,7 @@ from tilestamp.experiments.harness.registry import describe_folder, question
 from tilestamp.experiments.harness.result import Cell, Kind, Result
 from tilestamp.experiments.harness.scoreboard import Row, row_of
 from tilestamp.experiments.harness.texts import answered, averages, disagreements, fitted_numbers
+from tilestamp.reports.save import description
 
 FORMAT = 1
 NOT_RUN = "not run"
@@ -54,8 +55,9 @@ def record_of(result: Result, folder: Path, stand_ins: dict[str, str], seconds: 
 
 
 def _figure(name: str, folder: Path) -> dict[str, str | None]:
-    vector = folder / f"{name}.svg"
-    return {"name": name, "file": f"{name}.png", "vector": vector.name if vector.is_file() else None, "alt": ""}
+    file, vector = folder / f"{name}.png", folder / f"{name}.svg"
+    alt = description(file) or name
+    return {"name": name, "file": file.name, "vector": vector.name if vector.is_file() else None, "alt": alt}
 
 
 def cell_records(result: Result) -> list[dict[str, Any]]:

@@ -68,7 +68,7 @@ def write_result(result: Result, output: Path, making: Making) -> Path:
         for name, table in result.tables.items():
             table.to_csv(made / f"{name}.csv", index=False)
         for figure in result.figures:
-            draw_figure(figure, result, made / f"{figure.name}.png")
+            draw_figure(figure, result, made / figure.name)
         write_json(
             made / RECORD, record_of(result, made, used_manifest(making.used).get(STAND_INS, {}), making.seconds)
         )
@@ -93,7 +93,7 @@ def write_json(path: Path, value: object) -> None:
 
 
 def draw_figure(figure: Figure | CellFigure, result: Result, path: Path) -> None:
-    """Draw a figure of a result to a file."""
+    """Draw a figure of a result: where the path has no suffix, as PNG and as SVG."""
     if isinstance(figure, CellFigure):
         figure.draw(result.cells, path)
     else:

@@ -19,7 +19,7 @@ from tilestamp.experiments.laine2011.heavy_tail import Places, heavy_tail_scene
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.remembered import remembered
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
@@ -183,5 +183,5 @@ def draw_times(title: str, cells: "Sequence[Cell]", path: "Path") -> None:
         published="published",
         status="status",
         title=f"{title}, generated scenes, GTX 480 (published: on the real ones)",
-        y_label="time of a frame [ms]",
+        unit="time of a frame [ms]",
     )

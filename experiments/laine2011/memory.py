@@ -8,7 +8,7 @@ from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result
 from tilestamp.experiments.laine2011.generated import draw, frame_name, scenes, statistics, warning
 from tilestamp.experiments.laine2011.sweep import SOURCE
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
 
 if TYPE_CHECKING:
@@ -85,5 +85,5 @@ def _draw(cells: Sequence[Cell], path: "Path") -> None:
         published="published",
         status="status",
         title=title,
-        y_label="memory [MB]",
+        unit="memory [MB]",
     )

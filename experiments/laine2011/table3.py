@@ -12,7 +12,7 @@ from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
 from tilestamp.models.used import note
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.scenes.library import STAND_INS
 from tilestamp.simulator.scenes.search_path import find_scene
@@ -183,5 +183,5 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
         published="published",
         status="status",
         title=title,
-        y_label="share [%]",
+        unit="share [%]",
     )

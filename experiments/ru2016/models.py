@@ -20,7 +20,7 @@ from tilestamp.experiments.ru2016.setting import (
     published,
     waits_ms,
 )
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 
 QUESTION = "Are tiles faster than one thread a triangle?"
@@ -170,5 +170,5 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
     )
     paired_bars(
         bars, path, label="cell", ours="ours", published="published", status="status",
-        title="Eight models, three ways (GT 750M)", y_label="ms",
+        title="Eight models, three ways (GT 750M)", unit="ms",
     )  # fmt: skip

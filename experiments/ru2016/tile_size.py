@@ -19,7 +19,7 @@ from tilestamp.experiments.ru2016.setting import (
 )
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 
 QUESTION = "Which tile size is the fastest, and what occupancy does each allow?"
@@ -118,7 +118,7 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
     bars = pd.DataFrame([{"tile": c.row, "ours": c.ours, "published": c.published, "status": c.status} for c in rows])
     paired_bars(
         bars, path, label="tile", ours="ours", published="published", status="status",
-        title="The engine by tile size (GT 750M)", y_label="ms",
+        title="The engine by tile size (GT 750M)", unit="ms",
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastes
 from tilestamp.models.fitted import names_cell
 from tilestamp.models.machine import load_machine
 from tilestamp.models.used import FITTED, collect
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,7 +129,7 @@ def _figures(table: "pd.DataFrame") -> list[Figure]:
 def _bars(bars: "pd.DataFrame", scene: str, path: Path) -> None:
     paired_bars(
         bars, path, label="label", ours="ours", published="measured", status="status",
-        title=f"Tile raster of {scene} (H200)", y_label="us", known="measured",
+        title=f"Tile raster of {scene} (H200)", unit="us", known="measured",
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from tilestamp.models.fitted import Fitted
 from tilestamp.models.launch import Launch
 from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import load_machine
-from tilestamp.reports.plots import stacked_bars
+from tilestamp.reports.bars import stacked_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
 
@@ -140,9 +140,13 @@ def run(progress: Callable[[str], None]) -> Result:
         f"Assumed: mapping and unmapping the window's buffer costs {MAPPING_CALLS} such gaps.",
     ]
     bars = _breakdown(table, graph.path, gap, mapping)
+    columns = {"stream": "default_stream_ms", "graph": "cuda_graph_ms"}
+    known = pd.DataFrame({"GPU time": {name: float(asked["gpu_time"][key]) for name, key in columns.items()}})
     figure = Figure(
         "breakdown",
-        lambda path: stacked_bars(bars, path, title="A frame on the stream, and a graph's critical path", y_label="ms"),
+        lambda path: stacked_bars(
+            bars, path, title="A frame on the stream, and a graph's critical path", unit="time [ms]", published=known
+        ),
     )
     return Result(
         name="zhang2025-graph",

@@ -10,7 +10,7 @@ from tilestamp.experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
 from tilestamp.models.timing import Timing
-from tilestamp.reports.plots import paired_bars
+from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
@@ -190,6 +190,6 @@ def _figure(cells: list[Cell]) -> Figure:
         "after",
         lambda path: paired_bars(
             bars, path, label="kernel", ours="ours", published="published", status="status",
-            title=f"Kernels after optimization ({CANDIDATES[0]} {BASE})", y_label="us",
+            title=f"Kernels after optimization ({CANDIDATES[0]} {BASE})", unit="us",
         ),
     )  # fmt: skip
