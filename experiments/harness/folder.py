@@ -11,9 +11,9 @@ from tilestamp.experiments.harness.record import NOT_RUN, row_from
 from tilestamp.experiments.harness.registry import experiment_names
 from tilestamp.experiments.harness.scoreboard import Row, flat, total
 from tilestamp.experiments.harness.validity import outdated
-from tilestamp.experiments.harness.write import RECORD, write_json
+from tilestamp.experiments.harness.write import MANIFEST, RECORD, write_json
 from tilestamp.reports.page import write_page
-from tilestamp.simulator.manifest import now, source_digest
+from tilestamp.simulator.manifest import source_digest
 from tilestamp.simulator.scenes.search_path import SCENES_VARIABLE
 
 SCOREBOARD = "scoreboard"
@@ -36,7 +36,7 @@ def rebuild(output: Path) -> tuple[list[Row], list[str], Path]:
     records = stored(output)
     rows = [row_from(record, outdated(output, record["experiment"])) for record in records]
     said = advice(records, rows)
-    _write_scoreboard(output, rows, said)
+    _write_scoreboard(output, rows, said, _newest(output, records))
     _write_overviews(output, records)
     return rows, said, write_page(output)
 
@@ -70,10 +70,15 @@ def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
     return said
 
 
-def _write_scoreboard(output: Path, rows: Sequence[Row], said: Sequence[str]) -> None:
+def _newest(output: Path, records: Sequence[Record]) -> str:
+    """When the newest result was made, so that a page made again is the same page."""
+    return max((json.loads((output / r["name"] / MANIFEST).read_text("utf-8"))["date"] for r in records), default="")
+
+
+def _write_scoreboard(output: Path, rows: Sequence[Row], said: Sequence[str], date: str) -> None:
     import pandas as pd
 
-    about = {"format": 1, "tilestamp": tilestamp.__version__, "source_digest": source_digest(), "date": now()}
+    about = {"format": 1, "tilestamp": tilestamp.__version__, "source_digest": source_digest(), "date": date}
     numbers = {"rows": [asdict(row) for row in rows], "total": asdict(total(rows)), "advice": list(said)}
     write_json(output / f"{SCOREBOARD}.json", about | numbers)
     table = pd.DataFrame([flat(row) for row in rows], columns=list(flat(Row())))
