@@ -37,7 +37,7 @@ class Pace(NamedTuple):
     start : float
         From a free place to the first instruction of the unit put there.
     slower : float
-        Times that a unit's own time is longer while memory is busy and units wait for a place; 1: it is not.
+        Times that a unit's own time is longer while memory is busy, if it waited for its place; 1: it is not.
     """
 
     interval: float
@@ -60,7 +60,7 @@ def list_schedule(
     ``record`` may have no room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
-    taken does not start at once later. While more wait and memory is busy, units go on as slowly as ``pace`` says.
+    taken does not start at once later. Those that waited for a place go on more slowly while memory is busy (``Pace``).
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
     there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
@@ -69,7 +69,7 @@ def list_schedule(
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
     drawn = moved = end = last_start = held = 0.0
-    interval, start, slower = pace.interval, pace.start, pace.slower if waits else 1.0
+    interval, start, slower = pace
     begun, busy = -interval, moves.sum() if len(moves) > 0 else 0.0
     for i in range(units):
         begun += interval
@@ -85,8 +85,10 @@ def list_schedule(
         if len(moves) > 0:
             moved = max(moved, begun + start) + moves[i]
             done = max(done, moved)
-        waited = min((slower - 1.0) * alone[i], (1.0 - 1.0 / slower) * max(0.0, busy - begin))
-        done = max(done, begin + alone[i] + waited)
+        own = alone[i]
+        if i >= places:
+            own += min((slower - 1.0) * own, (1.0 - 1.0 / slower) * max(0.0, busy - begin))
+        done = max(done, begin + own)
         if len(record.start) > 0:
             record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
         held += done - begun

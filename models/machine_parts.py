@@ -123,7 +123,7 @@ class Memory(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     dram_fetch_bytes: Count = 32  # that a miss brings in
     l1_write_bytes_per_clock: Amount = 0.0  # as l1_bytes_per_clock, for stores, which L1 does not gather; 0: the same
     l1_line_cycles: Amount = 0.0  # of one SM, for a line fetched or stored in part, besides its bytes
-    loaded_latency: Ratio = 1.0  # times that a block takes longer by itself while memory is busy and blocks wait
+    loaded_latency: Ratio = 1.0  # times that a block that waited for a place takes longer, while memory is busy
 
 
 class Atomics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -14,8 +14,8 @@ as there are SMs. A block's first request comes a block start after it got its p
 
 *Memory.* DRAM or L2, the fuller of the two, serves the bytes of blocks in order. So blocks that find nothing to do
 start only when those before them, which have, leave their places. Blocks that start together want it together and
-leave together, so that it idles while the next ones start: where there are more than places, and until it has served
-all, a block goes on more slowly by itself (``Pace.slower``, measured: 1 where it was not).
+leave together, so that it idles while the next ones start: until it has served all, a block that waited for its place
+goes on more slowly by itself (``Pace.slower``, measured: 1 where it was not).
 
 *What it draws from.* An item of a queue begins when the draws before it have passed the fullest atomic unit.
 
