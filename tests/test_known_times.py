@@ -39,7 +39,7 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
         drawn = max(drawn, begun) + draws[i]
         moved = max(moved, begun + 0.7) + moves[i] if moving else 0.0
         begin = drawn if queue else begun
-        busy = max(0.0, moves.sum() - begin) if moving and units > places else 0.0  # a unit gets 1 / slower as far
+        busy = max(0.0, moves.sum() - begin) if moving and i >= places else 0.0  # a unit gets 1 / slower as far
         own = slower * alone[i] if slower * alone[i] < busy else busy + alone[i] - busy / slower
         free[0] = max(served[0], moved, begin + own)
         end = max(end, free[0])
@@ -66,14 +66,13 @@ def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_lat
 
 
 @pytest.mark.parametrize(("busy", "end"), [(0.0, 10.0), (6.0, 14.0), (30.0, 30.0), (15.0, 20.0)])
-def test_a_block_goes_more_slowly_while_memory_is_busy(busy, end):
-    """Of 10 cycles 2 pass in 6 that memory serves at a third of the pace: 8 are left. With a place for each, none."""
-    nothing, alone, moves = np.zeros(2), np.array([10.0, 0.0]), np.array([busy, 0.0])
-    found = list_schedule(nothing, alone, np.empty(0), moves, 1, 1, Pace(1.0, 0.0, 3.0), record_of(0))
-    assert found[0] == pytest.approx(end)
-    assert list_schedule(nothing, alone, np.empty(0), moves, 2, 2, Pace(1.0, 0.0, 3.0), record_of(0))[0] <= max(
-        10, busy
-    )
+def test_a_block_that_waited_goes_more_slowly_while_memory_is_busy(busy, end):
+    """Of 10 cycles 2 pass in 6 that memory serves at a third of the pace: 8 are left. With a place of its own, none."""
+    nothing, alone, moves = np.zeros(2), np.array([0.0, 10.0]), np.array([0.0, busy])
+    for places, expected in ((1, end), (2, max(10.0, busy))):
+        pace = Pace(0.0, 0.0, 3.0)
+        found = list_schedule(nothing, alone, np.empty(0), moves, places, places, pace, record_of(0))
+        assert found[0] == pytest.approx(expected)
 
 
 def test_a_block_holds_its_place_while_memory_serves_it():

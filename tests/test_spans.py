@@ -24,14 +24,14 @@ ROUNDING = 1e-6
 def naive(units, alone, places):
     """Start and end of each unit: heaps of places and SMs, the soonest taken each time."""
     free, served, drawn, moved, found, begun = [0.0] * places, [0.0] * units.sms, 0.0, 0.0, [], -units.pace.interval
-    slower, busy = units.pace.slower, sum(units.moves) if len(units.sm) > places else 0.0
+    slower, busy = units.pace.slower, sum(units.moves)
     for i, sm in enumerate(units.sm):
         begun = max(free[0], begun + units.pace.interval)
         done = max(served[0], begun + units.pace.start) + sm
         begin = begun
         if len(units.draws):
             drawn = begin = max(drawn, begun) + units.draws[i]
-        progress = max(0.0, min(busy - begin, slower * alone[i])) / slower  # made while memory is busy
+        progress = max(0.0, min(busy - begin, slower * alone[i])) / slower * (i >= places)  # while memory is busy
         end = max(done, begin + slower * progress + alone[i] - progress)
         if len(units.moves):
             moved = max(moved, begun + units.pace.start) + units.moves[i]
