@@ -218,3 +218,11 @@ def test_a_launch_of_one_round_is_in_step_with_itself():
 @pytest.mark.parametrize(("blocks", "said"), [(2112, ", 1.00 rounds"), (3168, ", 1.50 rounds")])
 def test_where_a_time_may_step_is_said(blocks, said):
     assert schedule(launch_of(blocks, 128), H200, NOTHING).residency == f"16 an SM by warps{said}"
+
+
+def test_of_two_round_trips_one_comes_on_top_of_what_memory_takes():
+    """Memory is idle until the first request and after the last; half of what the SM serves is waited for besides."""
+    memory, served = 10**5, 10**5 / AT_ONCE.memory.l1_bytes_per_clock
+    what = launch_of(132, CHAIN_LOAD=2, LOAD_BYTES=10**5)
+    got = schedule(what, AT_ONCE, Traffic(memory * AT_ONCE.dram_bytes_per_cycle, 0.0, 1.0))
+    assert got.cycles == pytest.approx(OVERHEAD + memory + START + DRAM + served / 2, rel=1e-5)
