@@ -61,3 +61,9 @@ def test_a_row_says_what_holds_what_breaks_and_what_the_cure_costs():
         "Never breaks up to aspect 64 :1: n.",
     ]
     assert next(iter(result.tables["boundaries"].breaks)) == 9.0
+
+
+def test_the_answer_of_the_atlas_names_the_first_that_breaks():
+    rows = [Boundary("a", "size", "px", 9, None, ""), Boundary("b", "size", "px", 1, 2, "holes: many"),
+            Boundary("c", "size", "px", 3, 4, "spills")]  # fmt: skip
+    assert atlas_result("stability/x", "", rows).answer == "2 of 3 break; b from size 2 px on: holes."

@@ -283,3 +283,23 @@ def test_a_fitted_event_of_a_mix_must_say_to_what(tmp_path, monkeypatch, line):
     monkeypatch.setattr(mix, "MIXES", tmp_path)
     with pytest.raises(TilestampError, match="fitted_to"):
         load_mix("mine", "1.3")
+
+
+def test_nothing_is_run_again_for_cells_that_an_experiment_only_reports():
+    runs = []
+
+    def reports(_progress):
+        runs.append(moved())
+        return Result(name="x", title="", source="", cells=[cell("a", "b", "ms", ALU.value, status="reported")])
+
+    run_judged(reports, lambda _: None)
+    assert runs == [""]
+
+
+def test_a_word_is_as_fitted_as_the_times_that_it_is_made_of_though_they_are_only_reported():
+    def run(_progress):
+        made_of = cell("a", "time", "ms", 5 * ALU.value / 3 + 5, status="reported")
+        word = cell("a", "word", "", "fast", of=(("a", "time"),))
+        return Result(name="x", title="", source="", cells=[made_of, word])
+
+    assert [c.status for c in run_judged(run, lambda _: None)[0].cells] == ["reported", "partly fitted"]

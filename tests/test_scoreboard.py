@@ -11,7 +11,7 @@ from rich.console import Console
 
 from tilestamp.experiments.commands import tables
 from tilestamp.experiments.commands.scoreboard import print_scoreboard
-from tilestamp.experiments.harness.folder import rebuild
+from tilestamp.experiments.harness.folder import rebuild, stored
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.scoreboard import Errors, Row, Words, flat, row_of, total
 from tilestamp.experiments.harness.texts import disagreements, score_text
@@ -147,3 +147,17 @@ def test_an_experiment_beside_which_nothing_is_published_shows_its_answer():
 
 def test_what_to_do_for_the_real_models_is_said():
     assert "put killeroo.bpt" in " ".join(shown(60, ROW, advice=["put killeroo.bpt there"]).split())
+
+
+def test_a_word_of_ours_beside_which_nothing_is_published_is_a_word():
+    assert cell("said", None, "8x8", "").kind == "order"
+
+
+def test_the_worst_error_of_all_is_the_worst_of_any():
+    assert total([Row(times=Errors(1, 0.1, 0.1)), Row(times=Errors(1, 0.9, 0.9))]).times.worst == 0.9
+
+
+def test_the_record_says_which_cells_are_averaged(tmp_path):
+    write_result(RESULT, tmp_path, Making())
+    (record,) = stored(tmp_path)
+    assert [c["row"] for c in record["cells"] if c["averaged"]] == ["near", "far", "no aim", "exact", "count"]

@@ -216,7 +216,8 @@ def test_one_experiment_run_again_leaves_all_others_on_the_page(tmp_path, runs):
     assert "eisenacher2010-claims" in (tmp_path / "index.html").read_text()
 
 
-def test_the_page_is_made_from_the_folder_alone(tmp_path, runs):
+def test_the_page_is_made_from_the_folder_alone(tmp_path, runs, monkeypatch):
+    monkeypatch.setattr("tilestamp.experiments.harness.folder.now", lambda: "today")  # stands in its footer
     reproduce(tmp_path, "table1")
     made = (tmp_path / "index.html").read_text()
     (tmp_path / "index.html").unlink()
@@ -266,3 +267,14 @@ def test_cells_of_a_stand_in_are_neither_predicted_nor_fitted_nor_missed():
     cells = run_judged(run, lambda _: None)[0].cells
     assert [cell.status for cell in cells] == ["predicted", "stand-in", "stand-in", "stand-in"]
     assert not any(cell.missed for cell in cells)
+
+
+def test_a_model_that_is_remembered_is_noted_again(monkeypatch, tmp_path):
+    from tilestamp.experiments.eisenacher2010.frames import model
+    from tilestamp.models.used import collect
+
+    monkeypatch.setenv(SCENES_VARIABLE, str(tmp_path))
+    model("bigguy")
+    with collect() as used:
+        model("bigguy")
+    assert "bigguy" in used[FILES]
