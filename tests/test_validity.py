@@ -269,6 +269,20 @@ def test_cells_of_a_stand_in_are_neither_predicted_nor_fitted_nor_missed():
     assert not any(cell.missed for cell in cells)
 
 
+def test_cells_of_a_stand_in_name_no_fitted_numbers():
+    from tilestamp.experiments.harness.fit import run_judged
+    from tilestamp.models.fitted import Fitted
+
+    number = Fitted("gpu: clock", 2.0, ("bigguy 64x48",))
+
+    def run(_say):
+        stand_in("bigguy")
+        return replace(RESULT, cells=[replace(CELL, ours=5 * number.value, frame="bigguy 64x48")])
+
+    (cell,) = run_judged(run, lambda _: None)[0].cells
+    assert (cell.share, cell.fitted_by) == (0.0, ())
+
+
 def test_a_model_that_is_remembered_is_noted_again(monkeypatch, tmp_path):
     from tilestamp.experiments.eisenacher2010.frames import model
     from tilestamp.models.used import collect

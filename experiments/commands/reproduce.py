@@ -109,7 +109,7 @@ def _print_failures(failed: list[Outcome]) -> int:
 def _print_end(output: Path, page: Path, valid: int, left: set[str]) -> None:
     """Say where everything is, what was not run again, and what was left out for its time."""
     if valid:
-        sys.stdout.write(f"{valid} results were valid and not run again (--again runs them)\n")
+        sys.stdout.write(f"Valid already, and not run again but with --again: {valid}\n")
     if left:
         sys.stdout.write(f"{len(left)} experiments take longer and were not run (name them, or --all)\n")
     sys.stdout.write(f"CSV, manifests and plots: {output}; the page: {page}\n")

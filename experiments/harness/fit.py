@@ -111,7 +111,9 @@ def _stand_ins_marked(cells: list[Cell], absent: Collection[str]) -> list[Cell]:
     """Mark the cells whose frame shows a stand-in, and those that are made of such cells."""
     drawn = {(cell.row, cell.column) for cell in cells if cell.frame.split(" ")[0] in absent}
     return [
-        replace(cell, status="stand-in") if drawn.intersection({(cell.row, cell.column), *cell.of}) else cell
+        replace(cell, status="stand-in", share=0.0, fitted_by=())
+        if drawn.intersection({(cell.row, cell.column), *cell.of})
+        else cell
         for cell in cells
     ]
 
