@@ -1,6 +1,7 @@
 """The command ``tilestamp``: parses arguments, turns errors into one sentence and an exit code."""
 
 import errno
+import io
 import os
 import shlex
 import signal
@@ -43,7 +44,7 @@ COMMANDS = {  # where each is, and its line in the list of commands: its own fir
     ),
     "list": (
         "catalogue:catalogue",
-        "List scenes, pipelines, machines or experiments, or the options of a pipeline, and what each is.",
+        "List scenes, pipelines, machines or experiments; or options, maps, numbers or views of one of them.",
     ),
 }
 HELP = "Reference simulator for rasterizers written in software for GPUs: exact pictures, counted work, priced time."
@@ -57,6 +58,8 @@ def main() -> None:
     """Run the command line and leave with its exit code."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small products: threads would spin longer than they compute
     signal.signal(signal.SIGTERM, _terminate)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a name that the terminal has no letters for is escaped
+        sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -84,6 +87,10 @@ def run_command(arguments: list[str]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except SystemExit as ended:  # rich ends so where nobody reads on
+        if isinstance(ended.__context__, BrokenPipeError):
+            return 0
+        raise
     except OSError as error:
         if error.errno not in FULL:
             raise
@@ -124,6 +131,8 @@ def _app(arguments: list[str]) -> "App":
     """Put the commands together, loaded when used; ``render`` has the flags of the pipeline that is named."""
     from cyclopts import App
 
+    from tilestamp.experiments.commands.examples import epilogue
+
     app = App(
         name="tilestamp",
         version=tilestamp.__version__,
@@ -132,15 +141,19 @@ def _app(arguments: list[str]) -> "App":
         help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
+    used = arguments[:1]
+    if not used or used[0].startswith("-"):
+        app.register_install_completion_command(help="Complete commands, options and names in this shell from now on.")
+        app.help_epilogue = epilogue("")
     for name, (place, line) in COMMANDS.items():
-        if name == "render" and arguments[:1] == [name]:
+        examples = {"help_epilogue": epilogue(name)} if used == [name] != ["ask"] else {}
+        if name == "render" and used == [name]:
             from tilestamp.experiments.commands.draw import PIPELINE
             from tilestamp.experiments.commands.option_flags import named_pipeline, with_flags
             from tilestamp.experiments.commands.render import render
 
-            app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)))
+            app.command(with_flags(render, named_pipeline(arguments[1:], PIPELINE)), **examples)
         else:
-            app.command(
-                f"tilestamp.experiments.commands.{place}", name=name, help=None if arguments[:1] == [name] else line
-            )
+            text = None if used == [name] else line
+            app.command(f"tilestamp.experiments.commands.{place}", name=name, help=text, **examples)
     return app

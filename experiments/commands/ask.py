@@ -8,9 +8,10 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from tilestamp.experiments.commands.outputs import check_png
+from tilestamp.experiments.commands.examples import epilogue
+from tilestamp.experiments.commands.outputs import check_png, writing
 from tilestamp.experiments.commands.study import agree, print_rows
-from tilestamp.experiments.commands.terminal import Progress, progress, writing
+from tilestamp.experiments.commands.terminal import Progress, progress
 from tilestamp.experiments.questions import answers
 from tilestamp.experiments.studies.places import StudyError
 from tilestamp.experiments.studies.store import Store
@@ -20,7 +21,11 @@ from tilestamp.experiments.studies.study_file import StudyFile
 StorePath = Annotated[Path | None, Parameter(name="--store")]
 Picture = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 Jobs = Annotated[int | None, Parameter(name=["--jobs", "-j"])]
-ask = App(name="ask", help="Ask a study: what is best where, what lies on a front, what matters, what is better still.")
+ask = App(
+    name="ask",
+    help="Ask a study: what is best where, what lies on a front, what matters, what is better still.",
+    help_epilogue=epilogue("ask"),
+)
 
 
 @ask.command
@@ -176,8 +181,8 @@ def _show(answer: answers.Answer, title: str, output: Path | None) -> None:
     print_rows(answer.table, title)
     sys.stdout.writelines(f"- {sentence}\n" for sentence in answer.sentences)
     if output is not None:
-        with writing(output):
-            answer.draw(output)
+        with writing(output) as partial:
+            answer.draw(partial)
         sys.stdout.write(f"picture: {output}\n")
 
 

@@ -7,8 +7,8 @@ from math import isclose
 from pathlib import Path
 from typing import Any
 
+from tilestamp.experiments.commands.outputs import writing
 from tilestamp.experiments.commands.tables import print_lines, print_table
-from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.why import LITTLE
@@ -151,5 +151,5 @@ def write_plot(runs: Sequence[Compared], path: Path) -> None:
     ]
     title = f"{', '.join(dict.fromkeys(run.scene for run in runs))}: milliseconds, and the bound"
     columns = {"group": "stage", "bar": "run", "value": "milliseconds", "note": "bound"}
-    with writing(path):
-        grouped_bars(pd.DataFrame(rows), path, **columns, title=title, label="milliseconds")
+    with writing(path) as partial:
+        grouped_bars(pd.DataFrame(rows), partial, **columns, title=title, label="milliseconds")

@@ -6,11 +6,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from tilestamp.experiments.commands.outputs import check_file, writing
 from tilestamp.experiments.commands.tables import print_table
-from tilestamp.experiments.commands.terminal import progress, writing
-from tilestamp.models.errors import TilestampError
+from tilestamp.experiments.commands.terminal import progress
 from tilestamp.models.machine import load_machine
-from tilestamp.models.paths import is_folder
 
 
 def measure_machine(
@@ -27,10 +26,7 @@ def measure_machine(
     base
         Machine from which the few numbers come that no micro-benchmark gives.
     """
-    if output.suffix != ".toml":
-        raise TilestampError(f"a machine file ends in .toml, not {output.name}")
-    if not is_folder(output.absolute().parent):
-        raise TilestampError(f"there is no folder {output.absolute().parent} to write {output.name} to")
+    check_file(output, "-o", ".toml")
     from tilestamp.experiments.validation.gpu import cupy
     from tilestamp.experiments.validation.machine_file import busy, machine_file
     from tilestamp.experiments.validation.measure import measure
@@ -45,8 +41,8 @@ def measure_machine(
             say(f"{number.key} = {number.value:.5g}")
             numbers.append(number)
     text = machine_file(numbers, load_machine(base), output.stem, f"{gpu}, measured", capability)
-    with writing(output):
-        output.write_text(text, "utf-8")
+    with writing(output) as partial:
+        partial.write_text(text, "utf-8")
     load_machine(output)
     rows = [[n.key, f"{n.value:.5g}", f"{100 * n.spread:.1f} %", n.how] for n in numbers]
     print_table(f"{gpu}: {output}", ["number", "value", "spread", "how"], rows)

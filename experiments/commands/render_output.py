@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.experiments.commands.outputs import writing
 from tilestamp.experiments.commands.render_table import print_stages
 from tilestamp.experiments.commands.tables import print_lines
-from tilestamp.experiments.commands.terminal import writing
 from tilestamp.models.error_model import was_measured
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.run_views import draw
@@ -18,13 +18,8 @@ def write_png(image: NDArray[np.uint8], path: Path) -> None:
     """Write a picture, all of it or nothing."""
     from PIL import Image
 
-    partial = path.with_suffix(".partial")
-    with writing(path):
-        try:
-            Image.fromarray(image).save(partial, format="png")
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with writing(path) as partial:
+        Image.fromarray(image).save(partial, format="png")
 
 
 def map_path(output: Path, name: str) -> Path:
@@ -34,8 +29,8 @@ def map_path(output: Path, name: str) -> Path:
 
 def write_map(run: Run, name: str, path: Path) -> None:
     """Draw a counter's heat map."""
-    with writing(path):
-        draw(run, "map", path, name)
+    with writing(path) as partial:
+        draw(run, "map", partial, name)
 
 
 def as_json(run: Run) -> dict[str, Any]:

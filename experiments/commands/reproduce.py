@@ -1,5 +1,6 @@
 """``tilestamp reproduce``: published tables beside ours."""
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -95,6 +96,8 @@ def _make(output: Path) -> None:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TilestampError(f"-o {output}: cannot be made ({error.strerror})") from error
+    if not os.access(output, os.W_OK):
+        raise TilestampError(f"-o {output}: the folder cannot be written to")
 
 
 def _print_failures(failed: list[Outcome]) -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from tilestamp.experiments.commands.outputs import check_file
 from tilestamp.experiments.commands.tables import print_table
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.studies.cells import MOST_LISTED
@@ -16,7 +17,6 @@ from tilestamp.experiments.studies.store import Store
 from tilestamp.experiments.studies.study_file import StudyFile
 from tilestamp.experiments.studies.table import export
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.paths import is_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,10 +85,8 @@ def _check(output: Path | None, jobs: int | None) -> None:
     """Refuse what could not be done, before anything is computed."""
     if jobs is not None and jobs < 1:
         raise TilestampError(f"{jobs} jobs: at least one process is needed")
-    if output is not None and output.suffix not in (".csv", ".parquet"):
-        raise TilestampError(f"-o {output}: tables are written as .csv or .parquet")
-    if output is not None and not is_folder(output.absolute().parent):
-        raise TilestampError(f"-o {output}: there is no folder {output.absolute().parent}")
+    if output is not None:
+        check_file(output, "-o", ".csv", ".parquet")
 
 
 def agree(cells: int, *, yes: bool) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 WIDE = 240  # columns of a table that goes to a file or a pipe
 UNLIMITED = 1000  # columns in which any table has room
 GAP = 2  # blanks between two columns
+SENTENCE = 30  # columns that a sentence needs beside others
+BELOW = "    "  # before one that stands below them
 
 
 def print_table(
@@ -150,6 +153,12 @@ def print_words(rows: Sequence[Sequence[str]], columns: Sequence[str] = ()) -> N
         padded = ["  ".join(map(str.ljust, line, widths)).rstrip() for line in lines]
         sys.stdout.writelines(f"{line}\n" for line in padded)
         return
+    if _too_narrow(lines, console.width):
+        for *short, long in rows:
+            print_lines(
+                "  ".join(short), *textwrap.wrap(long, console.width, initial_indent=BELOW, subsequent_indent=BELOW)
+            )
+        return
     from rich.table import Table
     from rich.text import Text
 
@@ -159,6 +168,13 @@ def print_words(rows: Sequence[Sequence[str]], columns: Sequence[str] = ()) -> N
     for row in rows:
         table.add_row(*map(Text, row))
     console.print(table)
+
+
+def _too_narrow(lines: Sequence[Sequence[str]], width: int) -> bool:
+    """Whether sentences in the last column would stand in a strip beside short cells."""
+    *short, long = (max(map(len, column)) for column in zip(*lines, strict=True))
+    left = width - sum(each + GAP for each in short)
+    return len(short) > 1 and left < min(long, SENTENCE)
 
 
 def print_entries(lines: Mapping[str, str]) -> None:

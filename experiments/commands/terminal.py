@@ -3,25 +3,14 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tilestamp.experiments.harness.telling import so_far
 from tilestamp.models.compile_cache import on_compiling
-from tilestamp.models.errors import TilestampError
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.status import Status
-
-
-@contextmanager
-def writing(path: Path, flag: str = "-o") -> Iterator[None]:
-    """Say in a sentence why a file cannot be written."""
-    try:
-        yield
-    except OSError as error:
-        raise TilestampError(f"{flag} {path}: cannot be written ({error.strerror or error})") from error
 
 
 @contextmanager

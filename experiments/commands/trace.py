@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.commands.terminal import writing
+from tilestamp.experiments.commands.outputs import writing
 from tilestamp.models.spans import OWN
 from tilestamp.reports.chrome_trace import Process, write_trace
 from tilestamp.simulator.run import Run
@@ -23,13 +23,8 @@ def write_schedule(run: Run, path: Path) -> str:
     shown = _shown(launches)
     units = sum(len(launch.start) for launch in shown)
     left_out = sum(len(launch.start) for launch in launches) - units
-    partial = path.with_name(f"{path.name}.partial")
-    with writing(path, "--trace"):
-        try:
-            together = write_trace([_process(launch) for launch in shown], partial, SLICES)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with writing(path, "--trace") as partial:
+        together = write_trace([_process(launch) for launch in shown], partial, SLICES)
     merged = f"{together} neighbours on a place of an SM as one slice" if together > 1 else "a slice each"
     merged += f", without {left_out:,} units of the shortest launches" if left_out else ""
     return f"trace: {path}, {units:,} units of {len(launches)} launches, {merged}; ui.perfetto.dev opens it"
@@ -92,5 +87,5 @@ def _parts(launch: LaunchTimeline) -> list[tuple[str, float, float]]:
 
 def draw_timeline(run: Run, path: Path) -> None:
     """Draw which SMs are taken, over time, in a colour for each stage."""
-    with writing(path, "--timeline"):
-        draw(run, "timeline", path)
+    with writing(path, "--timeline") as partial:
+        draw(run, "timeline", partial)

@@ -6,8 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from tilestamp.experiments.commands.outputs import check_file, writing
 from tilestamp.experiments.commands.tables import print_table
-from tilestamp.experiments.commands.terminal import progress, writing
+from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.validation.summary import by_kernel, fastest_tiles
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
@@ -33,8 +34,8 @@ def validate(
         CSV file for every compared number.
     """
     model = load_machine(machine)
-    if output is not None and not is_folder(output.absolute().parent):
-        raise TilestampError(f"-o {output}: there is no folder {output.absolute().parent}")
+    if output is not None:
+        check_file(output, "-o", ".csv")
     with progress("validating") as say:
         if measurements is None:
             from tilestamp.experiments.validation.on_gpu import compare_here
@@ -47,8 +48,8 @@ def validate(
 
             table, remarks = compare(measurements, executions(measurements, model, say)), []
     if output is not None:
-        with writing(output):
-            table.to_csv(output, index=False)
+        with writing(output) as partial:
+            table.to_csv(partial, index=False)
     rows = [
         [r.kernel, str(r.spp or ""), r.quantity, str(r.cells), f"{r['mean']:.3f}", f"{r.worst:.3f}"]
         for _, r in by_kernel(table).iterrows()

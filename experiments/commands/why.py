@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tilestamp.experiments.commands.outputs import writing
 from tilestamp.experiments.commands.tables import print_entries, print_lines, print_table
-from tilestamp.experiments.commands.terminal import writing
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.sensitivity import FRAME, Sensitivity
 from tilestamp.simulator.why import LITTLE, MEANING, plain, sentences
@@ -103,5 +103,5 @@ def write_tornado(run: Run, found: Sensitivity, path: Path) -> None:
 
     title = f"{run.scene} by {run.pipeline} on {run.machine.name}, {run.width}x{run.height}: {run.milliseconds:.4g} ms"
     order = found.numbers["stage"].map(found.free["now"]).sort_values(ascending=False, kind="stable")  # the frame first
-    with writing(path, "--tornado"):
-        tornado(found.numbers.loc[order.index], path, panel="stage", label="number", title=title, least=LITTLE)
+    with writing(path, "--tornado") as partial:
+        tornado(found.numbers.loc[order.index], partial, panel="stage", label="number", title=title, least=LITTLE)
