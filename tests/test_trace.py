@@ -150,7 +150,7 @@ def test_a_roofline_has_no_units_and_says_so(tmp_path):
 
 
 def test_a_trace_that_cannot_be_written_leaves_nothing(tmp_path, run):
-    (tmp_path / "t.json.gz.partial").mkdir()
+    (tmp_path / "partial.t.json.gz").mkdir()
     with pytest.raises(TilestampError, match="--trace"):
         trace.write_schedule(run, tmp_path / "t.json.gz")
     assert not (tmp_path / "t.json.gz").exists()

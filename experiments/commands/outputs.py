@@ -5,7 +5,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tilestamp.models.errors import TilestampError
@@ -40,7 +40,8 @@ def writing(path: Path, flag: str = "-o") -> Iterator[Path]:
     except OSError as error:
         raise TilestampError(f"{flag} {path}: cannot be written ({error.strerror or error})") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink()
 
 
 def write_json(value: object) -> None:
