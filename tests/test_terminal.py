@@ -42,6 +42,12 @@ def test_each_part_repeats_the_key_columns(lines):
     assert [line.split()[:3] for line in said if "12345678" in line] == [["total", "1", "spp"]] * 3
 
 
+def test_of_keys_that_would_leave_no_room_only_the_first_is_repeated(lines):
+    said = lines(tables.print_table, "title", ["a" * 15, "b" * 15, *"cdef"], [["x", "y", *["12345678"] * 4]], keys=2)
+    assert len([line for line in said if line.startswith("x")]) > 1
+    assert sum("y" in line for line in said) == 1
+
+
 def test_a_table_that_fits_exactly_is_one_part(lines):
     said = lines(tables.print_table, "title", ["a", "b", "c"], [["x" * 10, "y" * 13, "z" * (WIDTH - 27)]])
     assert len(said) == 3
@@ -135,3 +141,10 @@ def test_nothing_is_said_after_the_end(capsys):
     note_compiling(_terminal)
     note_compiled()
     assert capsys.readouterr().err == ""
+
+
+def test_long_sentences_beside_wide_cells_stand_below_them_on_a_narrow_terminal(lines):
+    said = lines(
+        tables.print_words, [["sm.count", "132", "measured by a very long sentence"]], ["number", "value", "source"]
+    )
+    assert said == ["sm.count  132", "    measured by a very long sentence"]

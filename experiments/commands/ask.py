@@ -62,7 +62,7 @@ def best(
     check_png(output)
     with _study(file, store) as (asked, say):
         agree(len(asked), yes=False)
-        _show(answers.best(asked, axis, _names(over), number, jobs, say), asked.title, output)
+        _show(answers.best(asked, axis, _names(over), number, jobs, say), asked, output)
 
 
 @ask.command
@@ -87,7 +87,7 @@ def front(
     check_png(output)
     with _study(file, store) as (asked, say):
         agree(len(asked), yes=False)
-        _show(answers.front(asked, one, other, jobs, say), asked.title, output)
+        _show(answers.front(asked, one, other, jobs, say), asked, output)
 
 
 @ask.command
@@ -111,7 +111,7 @@ def screen(
     """
     check_png(output)
     with _study(file, store) as (asked, _):
-        _show(answers.screened(asked, number, walks), asked.title, output)
+        _show(answers.screened(asked, number, walks), asked, output)
 
 
 @ask.command
@@ -135,7 +135,7 @@ def sobol(
     """
     check_png(output)
     with _study(file, store) as (asked, _):
-        _show(answers.shared(asked, number, points), asked.title, output)
+        _show(answers.shared(asked, number, points), asked, output)
 
 
 @ask.command
@@ -162,7 +162,7 @@ def search(
     """
     check_png(output)
     with _study(file, store) as (asked, say):
-        _show(answers.searched(asked, _names(wanted), cells, seed, say), asked.title, output)
+        _show(answers.searched(asked, _names(wanted), cells, seed, say), asked, output)
 
 
 @contextmanager
@@ -176,9 +176,9 @@ def _study(file: Path, store: Path | None) -> Iterator[tuple[Study, Progress]]:
         raise read.placed(error) from None
 
 
-def _show(answer: answers.Answer, title: str, output: Path | None) -> None:
+def _show(answer: answers.Answer, asked: Study, output: Path | None) -> None:
     """Print an answer, and draw it."""
-    print_rows(answer.table, title)
+    print_rows(answer.table, asked)
     sys.stdout.writelines(f"- {sentence}\n" for sentence in answer.sentences)
     if output is not None:
         with writing(output) as partial:

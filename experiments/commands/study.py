@@ -2,6 +2,7 @@
 
 import sys
 from contextlib import closing
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from tilestamp.experiments.studies.cells import MOST_LISTED
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.places import StudyError
 from tilestamp.experiments.studies.store import Store
+from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies.study_file import StudyFile
 from tilestamp.experiments.studies.table import export
 from tilestamp.models.errors import TilestampError
@@ -74,7 +76,7 @@ def study(
     except StudyError as error:
         raise read.placed(error) from None
     sys.stdout.writelines(f"{sentence}\n" for sentence in (*summary.changed, *summary.sentences()))
-    print_rows(table, asked.title)
+    print_rows(table, asked)
     if output is not None:
         export(table, output)
         sys.stdout.write(f"table: {output}\n")
@@ -101,10 +103,12 @@ def agree(cells: int, *, yes: bool) -> None:
         raise TilestampError(f"nothing was run of {cells:,} cells")
 
 
-def print_rows(table: "pd.DataFrame", title: str) -> None:
-    """Print the first rows of a table."""
+def print_rows(table: "pd.DataFrame", asked: Study) -> None:
+    """Print the first rows of a table: where it is parted, its leading axes stand in each part."""
+    columns = list(map(str, table.columns))
+    axes = len(list(takewhile(asked.axes.__contains__, columns)))
     rows = [[cell_text(value) for value in row] for row in table.head(PRINTED).itertuples(index=False)]
-    print_table(title, list(map(str, table.columns)), rows)
+    print_table(asked.title, columns, rows, keys=max(axes, 1))
     if len(table) > PRINTED:
         sys.stdout.write(f"... and {len(table) - PRINTED:,} rows more: -o FILE.csv has all\n")
 

@@ -50,7 +50,10 @@ def print_table(
         Columns that were not printed.
     """
     console = _console()
-    parts = _parts([columns, *rows], keys, together, console.width)
+    lines = [columns, *rows]
+    while keys > 1 and sum(_key_words(lines, keys)) > console.width / 2:
+        keys -= 1  # or little else would stand beside them
+    parts = _parts(lines, keys, together, console.width)
     if first:
         parts = [part for part in parts if part[keys] < keys + first]
     print_lines(title, style="italic")
@@ -94,10 +97,7 @@ def _parts(lines: Sequence[Sequence[str]], keys: int, together: int, width: int)
     def wide(column: int) -> int:
         return max(cell_len(line[column]) for line in lines) + GAP
 
-    key_words = [
-        max((cell_len(word) for line in lines for word in line[key].split()), default=0) for key in range(keys)
-    ]
-    room = width + GAP - sum(word + GAP for word in key_words)  # none after the last
+    room = width + GAP - sum(_key_words(lines, keys))  # none after the last
     parts: list[list[int]] = [] if keys < len(lines[0]) else [list(range(keys))]
     left = 0
     for column in range(keys, len(lines[0]), together):
@@ -111,6 +111,15 @@ def _parts(lines: Sequence[Sequence[str]], keys: int, together: int, width: int)
             parts[-1] += each
             left -= needed
     return parts
+
+
+def _key_words(lines: Sequence[Sequence[str]], keys: int) -> list[int]:
+    """Columns of the longest word of each key, with the gap behind it."""
+    from rich.cells import cell_len
+
+    return [
+        GAP + max((cell_len(word) for line in lines for word in line[key].split()), default=0) for key in range(keys)
+    ]
 
 
 def _print_part(
