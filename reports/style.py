@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 PALETTE = ("#1f5aa6", "#d95f02", "#1b9e77", "#7b5ea7", "#c2185b", "#8d6e2f", "#4f6d7a", "#000000")
 PUBLISHED = {"marker": "D", "markerfacecolor": "none", "markeredgecolor": "black", "markersize": 7, "linestyle": "none"}
 HEAT = "magma"
+MOST_PLAIN = 4  # decades of an axis whose numbers are written out
 NAME_WIDTH = 28  # letters of a line of a legend
 SETTINGS: dict[str, Any] = {
     "figure.figsize": (7.2, 4.4),
@@ -89,8 +90,8 @@ def legend_beside(axes: "Axes", handles: "Mapping[str, Artist] | None" = None) -
 
 
 def plain_ticks(axes: "Axes") -> None:
-    """Write plain numbers on logarithmic axes: at decades, and where there are few of them at 2 and 5 too."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+    """Write plain numbers on logarithmic axes, at 2 and 5 too where decades are few; powers where they are many."""
+    from matplotlib.ticker import LogFormatterMathtext, LogLocator, NullFormatter, StrMethodFormatter
 
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         if axis.get_scale() != "log":
@@ -98,5 +99,5 @@ def plain_ticks(axes: "Axes") -> None:
         decades = np.log10(high / low)
         steps = (1.0,) if decades > 2 else (1.0, 2.0, 5.0) if decades > 0.7 else tuple(np.arange(1.0, 10.0, 0.5))
         axis.set_major_locator(LogLocator(subs=steps))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}") if decades < MOST_PLAIN else LogFormatterMathtext())
         axis.set_minor_formatter(NullFormatter())
