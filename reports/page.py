@@ -24,6 +24,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 TITLE = "tilestamp: papers beside the model"
 FIRST_SCREEN = ("picture", "heat-map")  # figures
 COMPARED = ("row", "column", "unit", "published", "ours", "error", "status", "aim", "share", "fitted by")
+WIDEST, HIGHEST = 640, 380  # pixels of a plot on the page
 ALONE = ("row", "column", "ours", "unit")
 BOUNDARIES = ("method", "parameter", "holds", "breaks", "unit", "wrong", "cure", "cost")
 
@@ -111,6 +112,7 @@ def _figure(own: Path, figure: dict[str, Any]) -> dict[str, Any]:
         "vector": f"{own.name}/{vector}" if vector else None,
         "width": width,
         "height": height,
+        "shown": round(min(WIDEST, HIGHEST * width / height)),
     }
 
 

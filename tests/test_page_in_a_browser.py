@@ -132,6 +132,17 @@ def test_nothing_runs_out_of_the_page(visit, width):
 
 
 @pytest.mark.parametrize("width", [NARROW, WIDE])
+def test_a_plot_has_its_place_before_it_is_loaded(visit, width):
+    plot = visit(width).locator("article figure img[loading=lazy]").first
+    before = plot.bounding_box()
+    plot.scroll_into_view_if_needed()
+    plot.evaluate("async (plot) => plot.decode()")
+    after = plot.bounding_box()
+    assert (before["width"], before["height"]) == (after["width"], after["height"])
+    assert 100 < after["height"] <= 380
+
+
+@pytest.mark.parametrize("width", [NARROW, WIDE])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(visit, width, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not here")
