@@ -97,6 +97,13 @@ def test_a_point_of_the_scoreboard_opens_the_table_of_its_cell(visit):
     sync.expect(page.locator(":target")).to_be_in_viewport()
 
 
+def test_points_that_are_not_predicted_are_hollow_and_those_of_stand_ins_crosses(visit):
+    points = visit().locator("#chart-scoreboard .mark-symbol.role-mark path").all()
+    looks = [(point.get_attribute("fill") == "transparent", point.get_attribute("d")) for point in points]
+    assert [hollow for hollow, _ in looks] == [n % 5 != 0 for n in range(20)]  # statuses take turns
+    assert {n % 5 for n, (_, shape) in enumerate(looks) if shape != looks[0][1]} == {3}
+
+
 def test_a_word_of_the_glossary_is_explained_to_mouse_and_keyboard(visit):
     page = visit()
     term = page.locator(".lead .term").first
