@@ -291,3 +291,9 @@ def test_a_model_that_is_remembered_is_noted_again(monkeypatch, tmp_path):
     with collect() as used:
         model("bigguy")
     assert "bigguy" in used[FILES]
+
+
+def test_a_result_of_another_format_is_none(written):
+    record = next(written.glob("*/result.json"))
+    record.write_text(record.read_text().replace('"format": 2', '"format": 1'))
+    assert stored(written) == []

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import tilestamp
-from tilestamp.experiments.harness.record import NOT_RUN, row_from
+from tilestamp.experiments.harness.record import FORMAT, NOT_RUN, row_from
 from tilestamp.experiments.harness.registry import experiment_names
 from tilestamp.experiments.harness.scoreboard import Row, flat, total
 from tilestamp.experiments.harness.validity import outdated
@@ -42,9 +42,10 @@ def rebuild(output: Path) -> tuple[list[Row], list[str], Path]:
 
 
 def stored(output: Path) -> list[Record]:
-    """The results that lie in a folder, in the order of all experiments."""
+    """The results that lie in a folder, in the order of all experiments; none that another version wrote otherwise."""
     order = {name: index for index, name in enumerate(experiment_names())}
     records = [json.loads(path.read_text("utf-8")) for path in sorted(output.glob(f"*/{RECORD}"))]
+    records = [record for record in records if record.get("format") == FORMAT]
     return sorted(records, key=lambda record: order.get(record["experiment"], len(order)))
 
 
@@ -78,7 +79,7 @@ def _newest(output: Path, records: Sequence[Record]) -> str:
 def _write_scoreboard(output: Path, rows: Sequence[Row], said: Sequence[str], date: str) -> None:
     import pandas as pd
 
-    about = {"format": 1, "tilestamp": tilestamp.__version__, "source_digest": source_digest(), "date": date}
+    about = {"format": FORMAT, "tilestamp": tilestamp.__version__, "source_digest": source_digest(), "date": date}
     numbers = {"rows": [asdict(row) for row in rows], "total": asdict(total(rows)), "advice": list(said)}
     write_json(output / f"{SCOREBOARD}.json", about | numbers)
     table = pd.DataFrame([flat(row) for row in rows], columns=list(flat(Row())))

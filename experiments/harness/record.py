@@ -13,7 +13,7 @@ from tilestamp.experiments.harness.scoreboard import Row, row_of
 from tilestamp.experiments.harness.texts import answered, averages, disagreements, fitted_numbers
 from tilestamp.reports.save import description
 
-FORMAT = 1
+FORMAT = 2
 NOT_RUN = "not run"
 KINDS: tuple[Kind, ...] = ("time", "count")  # of cells that have an error
 OF_A_CELL = [field.name for field in fields(Cell)]
