@@ -29,7 +29,7 @@ POSITION_BYTES = 16
 WIDE = 8  # bytes of a fragment in one word
 
 
-@kernel
+@kernel(lent=True)
 def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: Any, row: Any) -> None:
     """Count loads of three indices and three positions a lane."""
     for k in range(3):
@@ -43,7 +43,7 @@ def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: An
         row[FreePipeEvent.LOAD_BYTES] += size + more_size
 
 
-@kernel
+@kernel(lent=True)
 def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
     """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
     active, boxes, most = 0, 0, 0
@@ -60,7 +60,7 @@ def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
     return active, boxes, most
 
 
-@kernel
+@kernel(lent=True)
 def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) -> tuple[int, int, int]:
     """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
 
@@ -74,8 +74,8 @@ def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) ->
             lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
             columns = np.uint32(pieces.box[p, 1] - pieces.box[p, 0] + 1)  # divided faster than a signed number
             lanes.row_columns[active], lanes.row_rest[active] = columns, columns % np.uint32(unroll)
-            rest = max(rest, lanes.row_rest[active])
-            turns = max(turns, np.int64(columns // np.uint32(unroll)))
+            rest = max(rest, int(lanes.row_rest[active]))
+            turns = max(turns, int(np.int64(columns // np.uint32(unroll))))
             active += 1
             for k in range(3):
                 lanes.pixel[lane, k] = lanes.row[lane, k]
@@ -85,13 +85,14 @@ def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) ->
     return active, rest, turns
 
 
-@kernel
+@kernel(lent=True)
 def _step(
     pieces: Pieces, lanes: Lanes, active: int, c: int, rest: int, word_bytes: int, ids: Any
 ) -> tuple[int, int, int]:
     """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
 
-    A lane first tests what its row has beyond whole turns of the loop, in the first ``rest`` steps of the warp. After those, lanes that have no such pixel leave the row, and the others close up.
+    A lane first tests what its row has beyond whole turns of the loop, in the first ``rest`` steps of the warp. After
+    those, lanes that have no such pixel leave the row, and the others close up.
     """
     tests, hits, stay = 0, 0, 0
     for i in range(active):
@@ -119,7 +120,7 @@ def _step(
     return stay, tests, hits
 
 
-@kernel
+@kernel(lent=True)
 def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: Simt, row: Any) -> int:
     """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
     count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
@@ -138,7 +139,7 @@ def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: 
     return kept
 
 
-@kernel
+@kernel(lent=True)
 def _slot(seen: Any, most: Any, key: int) -> int:
     """Place of a key in a hash table; a new one begins with 0."""
     i = key & (SLOTS - 1)
@@ -150,7 +151,7 @@ def _slot(seen: Any, most: Any, key: int) -> int:
     return i
 
 
-@kernel
+@kernel(lent=True)
 def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: Any, chunks: Any) -> None:
     """One instruction on each plane of the frame buffer, by the rules of ``tilestamp.models.atomics``.
 
@@ -179,7 +180,7 @@ def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: 
     row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
 
 
-@kernel
+@kernel(lent=True)
 def _scan(
     pieces: Pieces, lanes: Lanes, t0: int, shape: FrameShape, simt: Simt, row: Any, chunks: Any, frame: Any
 ) -> tuple[int, int, int]:
@@ -210,7 +211,7 @@ def _scan(
     return steps, rows, hit_steps
 
 
-@kernel
+@kernel(lent=True)
 def _warp(
     triangles: Any,
     pieces: Pieces,
