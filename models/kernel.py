@@ -15,7 +15,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 from tilestamp.models.kernel_cache import KernelCache
-from tilestamp.models.kernel_library import for_kernels, nested, outermost
+from tilestamp.models.kernel_library import for_kernels, gathers, nested, outermost
 
 
 class Kernel(Protocol):
@@ -81,7 +81,7 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
     def compile(self, sig: Any) -> Any:
         """Compile it, or load it."""
         with global_compiler_lock:
-            if nested():
+            if nested() or not gathers():
                 return super().compile(sig)
             types_given = tuple(normalize_signature(sig)[0])
             known = self.overloads.get(types_given)

@@ -16,7 +16,7 @@ from numba.core.runtime import rtsys
 
 from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling
 from tilestamp.models.kernel_digest import kernel_digest
-from tilestamp.models.kernel_library import KernelLibrary, environments, for_kernels, nested, no_address
+from tilestamp.models.kernel_library import KernelLibrary, environments, for_kernels, gathers, nested, no_address
 
 _UNREADABLE = (OSError, EOFError, AttributeError, ImportError, KeyError, pickle.UnpicklingError)
 
@@ -55,6 +55,8 @@ class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
         """Serialize, without the environments of Numba's own functions that hold nothing: each loads its module."""
         if for_kernels(cres.library):
             return self._reduce_for_kernels(cres)
+        if not gathers():
+            return super().reduce(cres)
         *all_else, needed = super().reduce(cres)
         return (*all_else, list(filter(_worth_keeping, needed)))
 
@@ -68,6 +70,8 @@ class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
         """Load the machine code alone; its bitcode waits until another kernel is compiled against it."""
+        if not gathers():
+            return super().rebuild(target_context, payload)
         (name, kind, code), described, *rest = payload
         if kind == "bitcode":
             return self._rebuild_for_kernels(target_context, payload)
@@ -144,7 +148,10 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         frame: what is on disk needs its memory manager alone.
         """
         self._find()
-        rtsys.initialize(target_context)
+        if gathers():
+            rtsys.initialize(target_context)
+        else:
+            target_context.refresh()
         index = self._cache_file._index_path  # noqa: SLF001
         try:
             found = self._load_overload(sig, target_context)

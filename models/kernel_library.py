@@ -9,12 +9,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numba
 from llvmlite.binding import parse_bitcode
 from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.cpu import CPUContext
 from numba.core.environment import lookup_environment
 
+TRIED = ("0.68",)  # versions of Numba whose private parts are known here
 _outermost: list["_Nesting"] = []  # of the kernel that is being compiled for Python, under Numba's compiler lock
 
 
@@ -119,6 +121,11 @@ class _Nesting(event.Listener):  # type: ignore[misc]
 def no_address() -> Any:
     """Stand for the address of a function that has none: Numba wants a built-in function, another for each."""
     return [].append
+
+
+def gathers() -> bool:
+    """Whether Numba's version has been tried; another compiles, keeps and loads each function by itself, as it does."""
+    return str(numba.__version__).startswith(tuple(f"{version}." for version in TRIED))
 
 
 @contextmanager

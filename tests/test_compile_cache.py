@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from tilestamp.models import compile_cache
+from tilestamp.models import compile_cache, kernel_library
 
 compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled with NUMBA_DISABLE_JIT")
 
@@ -130,6 +131,35 @@ def test_a_helper_is_compiled_for_its_callers_alone_until_python_calls_it(projec
     assert [kept.library.for_python for kept in helper.scaled.overloads.values()] == [False]
     assert helper.scaled(5) == 10
     assert [kept.library.for_python for kept in helper.scaled.overloads.values()] == [True]
+
+
+@compiled
+def test_a_version_of_numba_that_was_not_tried_compiles_each_helper_and_gives_the_same(project, monkeypatch):
+    answers = [_kernels_compiled(project, monkeypatch)]
+    monkeypatch.setattr(kernel_library, "TRIED", ())
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(project / "plain"))
+    answers += [_kernels_compiled(project, monkeypatch), _kernels_compiled(project, monkeypatch)]
+    assert answers == [(11, ["helper.scaled", "stage.stage"])] * 2 + [(11, [])]
+    assert importlib.import_module("kernel_project.helper").scaled(5) == 10
+
+
+@compiled
+def test_the_version_of_numba_that_the_tests_run_with_was_tried():
+    assert kernel_library.gathers() == numba.__version__.startswith("0.68.")
+
+
+@compiled
+def test_counts_are_the_same_where_each_helper_is_compiled_by_itself(tmp_path):
+    code = "import sys, numpy; from tilestamp.models import coalescing, kernel_library; "
+    code += "kernel_library.TRIED = sys.argv[1:]; addresses = numpy.arange(32) ** 2 * 4; "
+    code += "print([coalescing.transactions(addresses, 32, 4, rule) for rule in range(3)])"
+    told = []
+    for tried in (["0.68"], []):
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / str(len(tried)))}
+        command = [sys.executable, "-c", code, *tried]
+        told += [subprocess.run(command, env=environment, capture_output=True, check=True).stdout]  # noqa: S603 - our own
+    assert told[0] == told[1]
+    assert told[0].startswith(b"[(")
 
 
 @compiled

@@ -94,7 +94,7 @@ def _draw_strip(part: int, parts: int, pieces: Pieces, colors: Any, frame: Any, 
                 row_depth += pieces.depth[p, 2] * sixteen
 
 
-@kernel
+@kernel(lent=True)
 def _keep_least(frame: Any, tied: Any, y: int, x: int, depth: Any, payload: Any) -> None:
     value = (depth << np.uint64(32)) | payload
     old = frame[y, x, 0]
@@ -104,7 +104,7 @@ def _keep_least(frame: Any, tied: Any, y: int, x: int, depth: Any, payload: Any)
             frame[y, x, 0] = value
 
 
-@kernel
+@kernel(lent=True)
 def _keep_halves(frame: Any, halves: Any, tied: Any, y: int, x: int, depth: Any, t: int, colors: Any) -> None:
     """Both words, and beside them the least of depth, colour and triangle: what one wide word would hold."""
     color = np.uint64(colors[t])

@@ -33,7 +33,8 @@ class Lanes(NamedTuple):
     value: NDArray[np.uint64]  # (32,)
     row_lane: NDArray[np.int64]  # (32,) the lanes that have the row in hand, side by side ...
     row_pixel: NDArray[np.int64]  # (32,) ... the first pixel of each one's box in it ...
-    row_columns: NDArray[np.int64]  # (32,) ... and how many there are
+    row_columns: NDArray[np.int64]  # (32,) ... how many there are ...
+    row_rest: NDArray[np.int64]  # (32,) ... and how many beyond whole turns
     seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
     most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
     slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
@@ -50,6 +51,7 @@ def new_lanes() -> Any:
         np.empty(WARP, np.float32),
         np.empty(WARP, np.int64),
         np.empty(WARP, np.uint64),
+        np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),

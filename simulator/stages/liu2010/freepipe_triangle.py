@@ -36,7 +36,7 @@ class Pieces(NamedTuple):
     depth: NDArray[np.float32]  # (P, 3) NDC depth at the first pixel's centre, its slopes a sub-pixel in x and y
 
 
-@kernel
+@kernel(lent=True)
 def _distance(p: Any, plane: int, band: Any) -> Any:
     """Signed distance to a clip plane, in the order +x -x +y -y +z -z; x and y as far out as the band's half sides."""
     axis = plane // 2
@@ -44,7 +44,7 @@ def _distance(p: Any, plane: int, band: Any) -> Any:
     return w + p[axis] if plane % 2 == 0 else w - p[axis]
 
 
-@kernel
+@kernel(lent=True)
 def _is_inside(p: Any, band: Any) -> bool:
     if not p[3] >= _F0:
         return False
@@ -55,14 +55,14 @@ def _is_inside(p: Any, band: Any) -> bool:
     return True
 
 
-@kernel
+@kernel(lent=True)
 def _copy(source: Any, target: Any) -> None:
     """Copy a position; an assignment of slices would compile five seconds longer."""
     for c in range(4):
         target[c] = source[c]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _clip(polygon: Any, spare: Any, band: Any) -> int:
     """Clip a triangle by all six planes in turn; returns the polygon's vertices."""
     n = 3
@@ -89,7 +89,7 @@ def _clip(polygon: Any, spare: Any, band: Any) -> int:
     return n
 
 
-@kernel
+@kernel(lent=True)
 def _classify(polygon: Any, spare: Any, band: Any) -> tuple[int, int]:
     """Clip in place; returns what the thread does and how many pieces it scans."""
     if _is_inside(polygon[0], band) and _is_inside(polygon[1], band) and _is_inside(polygon[2], band):
@@ -104,14 +104,14 @@ def _classify(polygon: Any, spare: Any, band: Any) -> tuple[int, int]:
     return CLIPPED, max(_clip(polygon, spare, band) - 2, 0)
 
 
-@kernel
+@kernel(lent=True)
 def _pixels(a: int, b: int, c: int, bits: int, size: int) -> tuple[int, int]:
     """First and last pixel whose centre lies between the least and the largest of three coordinates."""
     half = 1 << (bits - 1)
     return max((min(a, b, c) + half - 1) >> bits, 0), min((max(a, b, c) - half) >> bits, size - 1)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _piece(vertices: Any, width: int, height: int, bits: int, corner: Any, box: Any, depth: Any) -> int:
     """Project and snap three clip positions, and find box and depth plane; returns which way it faces."""
     half = 1 << (bits - 1)
@@ -144,7 +144,7 @@ def _piece(vertices: Any, width: int, height: int, bits: int, corner: Any, box: 
     return facing
 
 
-@kernel
+@kernel(lent=True)
 def _thread(
     positions: Any,
     triangles: Any,
@@ -188,7 +188,7 @@ def _project_part(
         _thread(positions, triangles, t, width, height, bits, band, polygon, spare, fan, pieces)
 
 
-@kernel
+@kernel(lent=True)
 def start_edges(corner: Any, bits: int, x: int, y: int, edge: Any) -> None:
     """Edge functions at the centre of pixel (x, y), less one where the edge does not own its points."""
     half = np.int64(1) << (bits - 1)
@@ -201,7 +201,7 @@ def start_edges(corner: Any, bits: int, x: int, y: int, edge: Any) -> None:
         edge[3 + 2 * k], edge[4 + 2 * k] = dx << bits, dy << bits
 
 
-@kernel
+@kernel(lent=True)
 def fixed_depth(z: Any) -> Any:
     """NDC depth to 32 bits of fixed point, 0 nearest."""
     unit = min(max(z * np.float32(0.5) + np.float32(0.5), _F0), _F1)

@@ -26,9 +26,10 @@ from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
 
 INDEX_BYTES = 4
 POSITION_BYTES = 16
+WIDE = 8  # bytes of a fragment in one word
 
 
-@kernel
+@kernel(lent=True)
 def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: Any, row: Any) -> None:
     """Count loads of three indices and three positions a lane."""
     for k in range(3):
@@ -42,7 +43,7 @@ def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: An
         row[FreePipeEvent.LOAD_BYTES] += size + more_size
 
 
-@kernel
+@kernel(lent=True)
 def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
     """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
     active, boxes, most = 0, 0, 0
@@ -59,7 +60,7 @@ def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
     return active, boxes, most
 
 
-@kernel
+@kernel(lent=True)
 def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) -> tuple[int, int, int]:
     """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
 
@@ -71,9 +72,10 @@ def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) ->
         if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
             lanes.row_lane[active] = lane
             lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
-            lanes.row_columns[active] = pieces.box[p, 1] - pieces.box[p, 0] + 1
-            rest = max(rest, lanes.row_columns[active] % unroll)
-            turns = max(turns, lanes.row_columns[active] // unroll)
+            columns = np.uint32(pieces.box[p, 1] - pieces.box[p, 0] + 1)  # divided faster than a signed number
+            lanes.row_columns[active], lanes.row_rest[active] = columns, columns % np.uint32(unroll)
+            rest = max(rest, int(lanes.row_rest[active]))
+            turns = max(turns, int(np.int64(columns // np.uint32(unroll))))
             active += 1
             for k in range(3):
                 lanes.pixel[lane, k] = lanes.row[lane, k]
@@ -83,23 +85,24 @@ def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) ->
     return active, rest, turns
 
 
-@kernel
+@kernel(lent=True)
 def _step(
-    pieces: Pieces, lanes: Lanes, active: int, c: int, rest: int, unroll: int, word_bytes: int, ids: Any
+    pieces: Pieces, lanes: Lanes, active: int, c: int, rest: int, word_bytes: int, ids: Any
 ) -> tuple[int, int, int]:
     """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
 
-    With ``unroll`` a lane first tests what its row has beyond a multiple of that, in the first ``rest`` steps of the
-    warp. After those, lanes that have no such pixel leave the row, and the others close up.
+    A lane first tests what its row has beyond whole turns of the loop, in the first ``rest`` steps of the warp. After
+    those, lanes that have no such pixel leave the row, and the others close up.
     """
     tests, hits, stay = 0, 0, 0
     for i in range(active):
-        lane, first, columns = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i]
-        mine = columns % unroll if c < rest else columns - columns % unroll + rest
+        lane, first, columns, beyond = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i], lanes.row_rest[i]
+        mine = beyond if c < rest else columns - beyond + rest
         if c >= mine and c >= rest:
             continue
         if stay < i:
-            lanes.row_lane[stay], lanes.row_pixel[stay], lanes.row_columns[stay] = lane, first, columns
+            lanes.row_lane[stay], lanes.row_pixel[stay] = lane, first
+            lanes.row_columns[stay], lanes.row_rest[stay] = columns, beyond
         stay += 1
         if c >= mine:
             continue
@@ -117,7 +120,7 @@ def _step(
     return stay, tests, hits
 
 
-@kernel
+@kernel(lent=True)
 def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: Simt, row: Any) -> int:
     """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
     count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
@@ -136,7 +139,7 @@ def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: 
     return kept
 
 
-@kernel
+@kernel(lent=True)
 def _slot(seen: Any, most: Any, key: int) -> int:
     """Place of a key in a hash table; a new one begins with 0."""
     i = key & (SLOTS - 1)
@@ -148,15 +151,16 @@ def _slot(seen: Any, most: Any, key: int) -> int:
     return i
 
 
-@kernel
+@kernel(lent=True)
 def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: Any, chunks: Any) -> None:
     """One instruction on each plane of the frame buffer, by the rules of ``tilestamp.models.atomics``.
 
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
     """
     conflicts, depth, requests = 0, 0, 0
+    shift = 3 if shape.word_bytes == WIDE else 2
     for i in range(hits):
-        pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] // shape.word_bytes)
+        pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] >> shift)
         chunk = _slot(lanes.seen[1], lanes.most[1], lanes.address[i] // CHUNK_BYTES)
         rank, served = lanes.most[0, pixel] + 1, lanes.most[1, chunk]
         lanes.most[0, pixel], lanes.most[1, chunk] = rank, max(rank, served)
@@ -176,7 +180,7 @@ def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: 
     row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
 
 
-@kernel
+@kernel(lent=True)
 def _scan(
     pieces: Pieces, lanes: Lanes, t0: int, shape: FrameShape, simt: Simt, row: Any, chunks: Any, frame: Any
 ) -> tuple[int, int, int]:
@@ -196,9 +200,7 @@ def _scan(
         row[FreePipeEvent.REST_STEPS] += rest
         steps += here
         for c in range(here):
-            active, tests, hits = _step(
-                pieces, lanes, active, c, rest, shape.unroll, shape.word_bytes, frame is not None
-            )
+            active, tests, hits = _step(pieces, lanes, active, c, rest, shape.word_bytes, frame is not None)
             row[FreePipeEvent.SAMPLE_TESTS] += tests
             hit_steps += hits > 0
             row[FreePipeEvent.SAMPLE_HITS] += hits
@@ -209,7 +211,7 @@ def _scan(
     return steps, rows, hit_steps
 
 
-@kernel
+@kernel(lent=True)
 def _warp(
     triangles: Any,
     pieces: Pieces,

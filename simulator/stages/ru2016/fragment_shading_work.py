@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes.texture import TextureChains
 from tilestamp.simulator.stages.ru2016.tiled_raster import FRAGMENT_BYTES
 from tilestamp.simulator.stages.thread_per_item import Access, record_transactions
@@ -21,6 +23,7 @@ LOOK_WORDS = 1  # of a fragment: whether to shade it
 LIGHT_WORDS = 5  # texture pointer (8 bytes), normal: whatever is shaded
 TEXTURE_WORDS = 4  # coordinate, width, height
 BILINEAR_TEXELS = 4
+_DRAWN, _TEXTURED, _LINES, _ZEROS, _ZERO_LANES = range(5)  # of a warp: lanes, lanes, lines of 128 bytes, colours, lanes
 
 
 class FragmentShadingEvent(IntEnum):
@@ -64,21 +67,20 @@ def shading_work(
     simt : Simt
     """
     event = FragmentShadingEvent
-    shaded, textured = by_warp(drawn), by_warp(textures >= 0)
-    table = np.zeros((len(shaded) // 2, len(event)), np.int64)
+    counts, footprint = _count_warps(drawn, textures, uvs, chains)
+    table = np.zeros((len(counts) // 2, len(event)), np.int64)
     table[:, event.BLOCKS] = 1
     table[:, event.WARPS] = BLOCK // simt.warp
     table[:, event.WARP_LANES] = BLOCK
     drawn_columns = [event.DRAWN_WARPS, event.DRAWN_LANES, event.DRAWN_BLOCKS]
     textured_columns = [event.TEXTURED_WARPS, event.TEXTURED_LANES, event.TEXTURED_BLOCKS]
-    for columns, covered in ((drawn_columns, shaded), (textured_columns, textured)):
-        lanes = covered.sum(axis=1).reshape(-1, 2)
+    for columns, counted in ((drawn_columns, _DRAWN), (textured_columns, _TEXTURED)):
+        lanes = counts[:, counted].reshape(-1, 2)
         table[:, columns] = np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1), lanes.any(axis=1)], axis=1)
-    lines, footprint = _texel_lines(textures, uvs, chains)
     texels = BILINEAR_TEXELS if texture_filter == "bilinear" else 1
-    zero = texels * _zeros(textures, uvs, chains).reshape(-1, 2, 2).sum(axis=1)
-    table[:, [event.ZERO_TEXELS, event.ZERO_LANES]] = zero
-    texel_lines = texels * TEXEL_BYTES * lines.reshape(-1, 2).sum(axis=1)
+    both = texels * counts.reshape(-1, 2, counts.shape[1]).sum(axis=1)
+    table[:, event.ZERO_TEXELS], table[:, event.ZERO_LANES] = both[:, _ZEROS], both[:, _ZERO_LANES]
+    texel_lines = TEXEL_BYTES * both[:, _LINES]
     word = record_transactions(Access("fragments", FRAGMENT_BYTES, 1), simt)
     stored = record_transactions(Access("colors", 12, 3), simt)
     words = (
@@ -132,25 +134,52 @@ def _texels(textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: Textu
     return found
 
 
-def _zeros(textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains) -> NDArray[np.int64]:
-    """Colours of the nearest texel that are 0 in a lane, (warps, 2): how many of the three, and lanes."""
-    mapped = textures >= 0
-    zero = np.zeros((*textures.shape, TEXEL_BYTES), np.bool_)
-    if mapped.any():
-        zero[mapped] = chains.texels[_texels(textures[mapped], uvs[mapped], chains), :TEXEL_BYTES] == 0.0
-    lanes = np.stack([by_warp(zero[:, :, c]).sum(axis=1) for c in range(TEXEL_BYTES)], axis=1)
-    return np.stack([(lanes > 0).sum(axis=1), lanes.sum(axis=1)], axis=1)
-
-
-def _texel_lines(
-    textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains
+def _count_warps(
+    drawn: NDArray[np.bool_], textures: NDArray[np.int32], uvs: NDArray[np.float32], chains: TextureChains
 ) -> tuple[NDArray[np.int64], int]:
-    """Distinct 128-byte lines that each warp's texels lie in, (warps,), and of the whole frame; bytes of RGB8 rows."""
+    """Counts of each warp of 8x4 pixels, (warps, 5), and the 128-byte lines of texels that the frame touches."""
     mapped = textures >= 0
-    line = np.zeros(textures.shape, np.int64)
+    texel = np.full(textures.shape, -1, np.int64)
     if mapped.any():
-        first = _texels(textures[mapped], uvs[mapped], chains) * TEXEL_BYTES
-        line[mapped] = 1 + first // LINE_BYTES
-    warps = np.sort(by_warp(line), axis=1)
-    new = np.diff(warps, axis=1, prepend=0) != 0
-    return new.sum(axis=1), len(np.unique(line[mapped]))
+        texel[mapped] = _texels(textures[mapped], uvs[mapped], chains)
+    rows, columns = -(-drawn.shape[0] // SIDE), -(-drawn.shape[1] // SIDE)
+    counts = np.zeros((2 * rows * columns, _ZERO_LANES + 1), np.int64)
+    touched = np.zeros(int(texel.max(initial=0)) * TEXEL_BYTES // LINE_BYTES + 1, np.bool_)
+    for_parts(_count_rows, parts_of(rows), drawn, texel, chains.texels, counts, touched)
+    return counts, int(touched.sum())
+
+
+@kernel
+def _count_rows(part: int, parts: int, drawn: Any, texel: Any, texels: Any, counts: Any, touched: Any) -> None:
+    """Count the warps of a share of the rows of blocks; a block is two warps, the upper first."""
+    lines = np.empty(BLOCK // 2, np.int64)
+    zero = np.empty(TEXEL_BYTES, np.int64)
+    across = -(-drawn.shape[1] // SIDE)
+    rows = len(counts) // (2 * across)
+    for warp in range(rows * part // parts * 2 * across, rows * (part + 1) // parts * 2 * across):
+        block, row = warp // 2, counts[warp]
+        top, left = block // across * SIDE + warp % 2 * (SIDE // 2), block % across * SIDE
+        zero[:] = 0
+        for y in range(top, min(top + SIDE // 2, drawn.shape[0])):
+            for x in range(left, min(left + SIDE, drawn.shape[1])):
+                row[_DRAWN] += drawn[y, x]
+                t = texel[y, x]
+                if t >= 0:
+                    row[_TEXTURED] += 1
+                    row[_LINES] += _is_new(t * TEXEL_BYTES // LINE_BYTES, lines, row[_LINES], touched)
+                    for c in range(TEXEL_BYTES):
+                        zero[c] += texels[t, c] == np.float32(0)
+        for c in range(TEXEL_BYTES):
+            row[_ZEROS] += zero[c] > 0
+            row[_ZERO_LANES] += zero[c]
+
+
+@kernel
+def _is_new(line: int, lines: Any, known: int, touched: Any) -> bool:
+    """Whether a line is none of the warp's first ``known``; it then is the next."""
+    for i in range(known - 1, -1, -1):
+        if lines[i] == line:
+            return False
+    lines[known] = line
+    touched[line] = True
+    return True

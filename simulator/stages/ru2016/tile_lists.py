@@ -9,7 +9,7 @@ The original gives each tile room for all triangles if there are at most 100, el
 check for overflow. Here an overflow is dropped and reported; the default counts first, scans, and then fills.
 """
 
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.ru2016.compiled import words
-from tilestamp.simulator.stages.ru2016.tile_lists_fill import fill
+from tilestamp.simulator.stages.ru2016.tile_lists_fill import count_entries, fill
 from tilestamp.simulator.stages.ru2016.tile_lists_warps import BLOCK, TileListEvent, walkers
 from tilestamp.simulator.stages.ru2016.vertex_shading import PRIMITIVE_BYTES
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
@@ -28,6 +29,7 @@ from tilestamp.simulator.work import Work
 SCAN_BLOCK = 256  # threads (ours: the original has no scan)
 SMALL_MODEL = 100  # triangles up to which a list can hold all of them
 COORDINATES = 6  # words read of each primitive: x and y of its corners
+_PART_TRIANGLES = 4096  # at least
 SECTOR_BYTES = 32  # loads of compute capability 3.0 pass by L1 and move such sectors
 Capacity = Literal["safe", "original"]
 
@@ -94,23 +96,30 @@ def tile_lists(
     if capacity == "original":
         room = len(drawable) if len(drawable) <= SMALL_MODEL else len(drawable) // 10
 
-    def launch(kernel: str, limits: NDArray[np.int64], entries: NDArray[np.int32] | None) -> tuple[Any, int, Work]:
-        events = np.zeros((blocks, len(TileListEvent)), np.int64)
-        requests = np.zeros(tiles // 8 + 1, np.int64)
-        sizes = np.zeros(tiles, np.int64)
-        lost = fill(*given, room, limits, sizes, entries, requests, events)
-        _add_primitive_loads(events, simt)
-        return sizes, lost, Work(
-            stage="tile_lists", kernel=kernel, events=TileListEvent, table=events, grid=blocks, block=BLOCK,
-            streams=_streams(events, len(drawable), tiles), atomic_requests=requests,
-        )  # fmt: skip
-
-    sizes, _, counting = launch("tile_counts", np.zeros(tiles + 1, np.int64), None)
+    parts = parts_of(len(drawable), _PART_TRIANGLES)
+    counted = np.zeros((parts, tiles), np.int64)
+    for_parts(count_entries, parts, *given[:2], counted)
+    sizes = counted.sum(axis=0)
     kept = np.minimum(sizes, room) if room else sizes
     starts = np.concatenate([[0], np.cumsum(kept)]).astype(np.int64)
     entries = np.empty(int(starts[-1]), np.int32)
-    _, lost, filling = launch("tile_lists", starts, entries)
-    works = (filling,) if room else (counting, _scan(tiles, simt), filling)
+    events = np.zeros((blocks, len(TileListEvent)), np.int64)
+    requests = np.zeros(tiles // 8 + 1, np.int64)
+    lost = fill(*given, room, starts, np.zeros(tiles, np.int64), entries, requests, events)
+    _add_primitive_loads(events, simt)
+
+    def launched(kernel: str, table: NDArray[np.int64]) -> Work:
+        return Work(
+            stage="tile_lists", kernel=kernel, events=TileListEvent, table=table, grid=blocks, block=BLOCK,
+            streams=_streams(table, len(drawable), tiles), atomic_requests=requests,
+        )  # fmt: skip
+
+    filling = launched("tile_lists", events)
+    if room:
+        return StageResult(TileLists(starts, entries), (filling,), {"lost": lost})
+    counting = events.copy()  # the same walk, which stores nothing
+    counting[:, [TileListEvent.STORE_TRANSACTIONS, TileListEvent.STORE_BYTES]] = 0
+    works = launched("tile_counts", counting), _scan(tiles, simt), filling
     return StageResult(TileLists(starts, entries), works, {"lost": lost})
 
 

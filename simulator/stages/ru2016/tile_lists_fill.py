@@ -12,7 +12,7 @@ import numpy as np
 from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.borrow import borrow, row_of
+from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.ru2016.tile_lists_warps import BLOCK, COUNTER_WORD, SEPARATED_BY_NONE, TileListEvent
 from tilestamp.simulator.stages.ru2016.triangle import area, corners, pixel_box
 
@@ -60,11 +60,31 @@ def _separates(
 
 
 @kernel(error_model="numpy")
+def count_entries(part: int, parts: int, mesh: Any, frame: Any, sizes: Any) -> None:
+    """Count the entries of each tile's list, of a share of the triangles in a row of ``sizes``; their order is free."""
+    screen, triangles, drawable = mesh
+    width, height, tile, culling = frame
+    across = (width + tile - 1) // tile
+    side = np.float32(tile)
+    for i in range(len(drawable) * part // parts, len(drawable) * (part + 1) // parts):
+        x0, y0, x1, y1, x2, y2 = corners(screen, triangles, drawable[i])
+        if culling and area(x0, y0, x1, y1, x2, y2) <= _ZERO:
+            continue
+        left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, width, height)
+        if left > right or top > bottom:
+            continue
+        for line in range(top // tile, bottom // tile + 1):
+            for column in range(left // tile, right // tile + 1):
+                if overlaps(x0, y0, x1, y1, x2, y2, np.float32(column * tile), np.float32(line * tile), side):
+                    sizes[part, line * across + column] += 1
+
+
+@kernel(error_model="numpy")
 def fill(
     mesh: Any, frame: Any, rules: Any, walkers: Any, room: int, limits: Any, sizes: Any, entries: Any, requests: Any,
     events: Any,
 ) -> int:  # fmt: skip
-    """Walk all warps; ``entries`` None: only count. Returns the appends that found no room.
+    """Walk all warps; returns the appends that found no room.
 
     Parameters
     ----------
@@ -85,7 +105,7 @@ def fill(
     for first in range(0, total, resident):
         count = min(total, first + resident) - first
         for w in range(count):
-            row = row_of(events, (first + w) * warp // BLOCK)
+            row = events[(first + w) * warp // BLOCK]
             rows = _boxes(borrow(mesh), (first + w) * warp, borrow(frame), walkers.boxes[w], row)
             walkers.place[w, :] = 0
             walkers.place[w, 3] = rows
@@ -115,15 +135,14 @@ def _rounds(
             if w >= count or place[w, 1] >= place[w, 3]:
                 continue
             busy = True
-            row = row_of(events, (first + w) * warp // BLOCK)
+            row = events[(first + w) * warp // BLOCK]
             appended, missed = _append(
                 mesh, frame, boxes[w], place[w], room, limits, sizes, entries, addresses, places, row
             )
             lost += missed
             if appended > 0:
                 place[w, 5] += 1
-                if events is not None:
-                    _count_append(addresses, places, warp, rules, row, requests)
+                _count_append(addresses, places, warp, rules, row, requests)
             place[w, 4] += 1
             place[w, 0] += 1
             if place[w, 0] >= place[w, 2]:  # lanes meet after each row
@@ -131,14 +150,13 @@ def _rounds(
                 place[w, 1] += 1
                 if place[w, 1] < place[w, 3]:
                     _begin_row(boxes[w], place[w], row)
-    if events is not None:
-        for w in range(count):
-            row = events[(first + w) * warp // BLOCK]
-            row[TileListEvent.BOX_STEPS] += place[w, 4]
-            row[TileListEvent.LONGEST] = max(row[TileListEvent.LONGEST], place[w, 4])
-            row[TileListEvent.LONGEST_APPENDS] = max(row[TileListEvent.LONGEST_APPENDS], place[w, 5])
-            row[TileListEvent.LONGEST_EDGES] = max(row[TileListEvent.LONGEST_EDGES], place[w, 6])
-            row[TileListEvent.LONGEST_ROWS] = max(row[TileListEvent.LONGEST_ROWS], place[w, 3])
+    for w in range(count):
+        row = events[(first + w) * warp // BLOCK]
+        row[TileListEvent.BOX_STEPS] += place[w, 4]
+        row[TileListEvent.LONGEST] = max(row[TileListEvent.LONGEST], place[w, 4])
+        row[TileListEvent.LONGEST_APPENDS] = max(row[TileListEvent.LONGEST_APPENDS], place[w, 5])
+        row[TileListEvent.LONGEST_EDGES] = max(row[TileListEvent.LONGEST_EDGES], place[w, 6])
+        row[TileListEvent.LONGEST_ROWS] = max(row[TileListEvent.LONGEST_ROWS], place[w, 3])
     return lost
 
 
@@ -154,10 +172,9 @@ def _begin_row(boxes: Any, place: Any, row: Any) -> None:
             tiles += boxes[lane, 1]
             lanes += 1
     place[2] = columns
-    if row is not None:
-        row[TileListEvent.ROW_STEPS] += 1
-        row[TileListEvent.ROW_LANES] += lanes
-        row[TileListEvent.BOX_LANES] += tiles
+    row[TileListEvent.ROW_STEPS] += 1
+    row[TileListEvent.ROW_LANES] += lanes
+    row[TileListEvent.BOX_LANES] += tiles
 
 
 @kernel(error_model="numpy")
@@ -195,16 +212,14 @@ def _append(
         stored = target * room + sizes[target] if room else at
         sizes[target] += 1
         appended += 1
-        if entries is not None:
-            if at < limits[target + 1]:
-                entries[at] = t
-                places[lane] = stored * COUNTER_WORD
-            else:
-                lost += 1
+        if at < limits[target + 1]:
+            entries[at] = t
+            places[lane] = stored * COUNTER_WORD
+        else:
+            lost += 1
     place[6] += deepest
-    if row is not None:
-        row[TileListEvent.EDGE_STEPS] += deepest
-        row[TileListEvent.EDGE_LANES] += lanes
+    row[TileListEvent.EDGE_STEPS] += deepest
+    row[TileListEvent.EDGE_LANES] += lanes
     return appended, lost
 
 
@@ -222,11 +237,9 @@ def _boxes(mesh: Any, first: int, frame: Any, boxes: Any, row: Any) -> int:
             continue
         t = drawable[first + lane]
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
-        if row is not None:
-            row[TileListEvent.WARP_LANES] += 1
+        row[TileListEvent.WARP_LANES] += 1
         if culling and area(x0, y0, x1, y1, x2, y2) <= _ZERO:
-            if row is not None:
-                row[TileListEvent.CULLED] += 1
+            row[TileListEvent.CULLED] += 1
             continue
         front += 1
         left, right, top, bottom = pixel_box(x0, y0, x1, y1, x2, y2, width, height)
@@ -238,10 +251,9 @@ def _boxes(mesh: Any, first: int, frame: Any, boxes: Any, row: Any) -> int:
         boxes[lane, 3] = bottom // tile - top // tile + 1
         boxes[lane, 4] = t
         most = max(most, boxes[lane, 3])
-    if row is not None:
-        row[TileListEvent.WARPS] += 1
-        row[TileListEvent.FRONT_WARPS] += min(front, 1)
-        row[TileListEvent.FRONT_LANES] += front
+    row[TileListEvent.WARPS] += 1
+    row[TileListEvent.FRONT_WARPS] += min(front, 1)
+    row[TileListEvent.FRONT_LANES] += front
     return most
 
 
