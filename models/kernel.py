@@ -30,9 +30,15 @@ class Kernel(Protocol):
 @overload
 def kernel(function: Callable[..., Any]) -> Kernel: ...
 @overload
-def kernel(*, error_model: str = ..., lent: bool = ...) -> Callable[[Callable[..., Any]], Kernel]: ...
 def kernel(
-    function: Callable[..., Any] | None = None, *, error_model: str = "python", lent: bool = False
+    *, error_model: str = ..., lent: bool = ..., inline: bool = ...
+) -> Callable[[Callable[..., Any]], Kernel]: ...
+def kernel(
+    function: Callable[..., Any] | None = None,
+    *,
+    error_model: str = "python",
+    lent: bool = False,
+    inline: bool = False,
 ) -> Kernel | Callable[[Callable[..., Any]], Kernel]:
     """Compile a function where it is first called; it releases the GIL, and what was compiled is kept on disk.
 
@@ -44,12 +50,15 @@ def kernel(
     lent : bool
         The arrays that it takes are the caller's, and it makes none: then compiled code counts no references to them.
         Counting calls a function twice for each array (of a tuple, too) of each call, more than a small kernel's work.
+    inline : bool
+        Its code is copied to where it is called: of a kernel that works for less time than its arguments take to pass.
     """
 
     def compiled(function: Callable[..., Any]) -> Kernel:
         if config.DISABLE_JIT:
             return function  # type: ignore[return-value]  # which is its own py_func
-        options = {"nopython": True, "nogil": True, "error_model": error_model, "boundscheck": None, "_nrt": not lent}
+        options = {"nopython": True, "nogil": True, "error_model": error_model, "boundscheck": None}
+        options |= {"_nrt": not lent, "forceinline": inline}
         return _Dispatcher(function, targetoptions=options)
 
     return compiled if function is None else compiled(function)

@@ -40,7 +40,7 @@ class Job(NamedTuple):
 
     def depth_at(self, slot, sx, sy):
         """Depth of a triangle's plane at a sample."""
-        zx, zy, zb = (int(c) for c in self.setup.planes[slot][:3])
+        zx, zy, zb = (int(c) for c in self.setup.planes[self.setup.records[slot]][:3])
         return (zx * sx + zy * sy + zb) % 2**32
 
     def covered(self, slot, x, y):
@@ -182,7 +182,7 @@ class _Tile:
     def _hidden(self, slot, x, y):
         """Whether a fragment lies behind all samples of its pixel, by the nearest depth that its plane has there."""
         far, s = self.far_of[x - self.left, y - self.bottom], self.job.log_samples
-        zx, zy, zb, slope = (int(c) for c in self.job.setup.planes[slot][:4])
+        zx, zy, zb, slope = (int(c) for c in self.job.setup.planes[self.job.setup.records[slot]][:4])
         nearest = (((zx + zy) << (s - 1)) + ((zx * x + zy * y) << s) + zb - slope) % 2**32
         sure = far <= nearest < (nearest + 2 * slope) % 2**32
         return sure or int(self.job.setup.misc[slot]) & 0xFFFFF000 >= far

@@ -82,7 +82,7 @@ TRIANGLE = [[-0.5, -0.5, 0, 1], [0.5, -0.5, 0, 1], [0, 0.5, 0, 1]]
 def test_a_plain_triangle_is_stored_at_its_own_slot():
     out, (work,), facts = setup(TRIANGLE, [[0, 1, 2]])
     assert out.subtriangles.tolist() == [1]
-    assert out.first.tolist() == [0]
+    assert out.records.tolist() == [0]
     assert out.headers.tolist() == [[-128, -96, 128, -96, 0, 96]]
     assert facts["numSubtris"] == 1
     assert work.total(E.STORE_LANES) == 1
@@ -113,7 +113,7 @@ def test_across_the_near_plane_subtriangles_follow_the_own_slots_in_input_order(
     crossing = [[-0.5, -0.5, -2, 1], [0.5, -0.5, 0, 1], [0, 0.5, 0, 1]]
     out, (work,), facts = setup(crossing + TRIANGLE, [[0, 1, 2], [3, 4, 5], [0, 1, 2]])
     assert out.subtriangles.tolist() == [2, 1, 2]
-    assert out.first.tolist() == [3, 1, 5]
+    assert out.records[[3, 4, 1, 5, 6]].tolist() == [3, 4, 0, 5, 6]
     assert out.misc[[0, 2]].tolist() == [3, 5]
     assert out.inputs[3:].tolist() == [0, 0, 2, 2]
     assert facts["numSubtris"] == 7

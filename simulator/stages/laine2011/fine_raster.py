@@ -70,11 +70,11 @@ def _store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile,
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
             at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            slot, color = tile.owner[at], tile.color[at]
-            if slot >= 0:
-                buffers.ids[sample, j, i] = setup.inputs[slot]
+            record, color = tile.owner[at], tile.color[at]
+            if record >= 0:
+                buffers.ids[sample, j, i] = setup.inputs[record]
                 if draw.shade_late:
-                    color = shade(setup.planes, slot, colors, i, j, -1, draw)
+                    color = shade(setup.planes, record, colors, i, j, -1, draw)
             elif draw.clear:
                 buffers.ids[sample, j, i] = -1
             else:
@@ -258,7 +258,7 @@ def fine_raster(
         coalescing=int(simt.coalescing),
     )
     if colors is None:
-        colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1, 4), np.float32)
+        colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1 if write_color else 1, 4), np.float32)
     drawn = active_tiles if units is None else active_tiles[units]
     if buffers is None:
         buffers = new_buffers(width, height, samples, cleared=units is None and len(drawn) < len(tile_starts) - 1)

@@ -71,7 +71,7 @@ def _cull_fragments(setup: Setup, draw: Draw, tile: Tile, n: int, left: int, bot
         p, slot = tile.pixel[lane], tile.slot[lane]
         i, j = 7 - (p & 7), p >> 3
         x, y = ((left + draw.half_width) >> 4) + i, ((bottom + draw.half_height) >> 4) + j
-        hidden = draw.depth and _hidden(setup.planes[slot], setup.misc[slot], tile.zmax[p], x, y, s)
+        hidden = draw.depth and _hidden(setup.planes[setup.records[slot]], setup.misc[slot], tile.zmax[p], x, y, s)
         if hidden and row is None:
             continue
         mask = sample_mask(setup.headers[slot], left + 16 * i + 8, bottom + 16 * j + 8, s)
@@ -97,13 +97,13 @@ def _write_sample(setup: Setup, draw: Draw, tile: Tile, sample: int, lane: int, 
     p, slot = tile.pixel[lane], tile.slot[lane]
     at, s = p + PIXELS * sample, draw.log_samples
     if draw.depth:
-        record = setup.planes[slot]
+        record = setup.planes[setup.records[slot]]
         sx, sy = (x << s) + SAMPLE_COLUMN[s, sample], (y << s) + sample
         depth = (np.int64(record[0]) * sx + np.int64(record[1]) * sy + np.int64(record[2])) & _LOW
         if depth >= tile.depth[at]:
             return False
         tile.depth[at] = depth
-    tile.owner[at] = slot
+    tile.owner[at] = setup.records[slot]
     if draw.write_color:
         tile.color[at] = blend_over(color, tile.color[at]) if draw.blend else color
     return True
@@ -151,7 +151,7 @@ def _shade_survivors(
         p = tile.pixel[lane]
         x, y = column + 7 - (p & 7), line + (p >> 3)
         centroid = centroid_sample(tile.mask[lane], draw.log_samples)
-        shaded[lane] = shade(setup.planes, tile.slot[lane], colors, x, y, centroid, draw)
+        shaded[lane] = shade(setup.planes, setup.records[tile.slot[lane]], colors, x, y, centroid, draw)
 
 
 @kernel(lent=True)

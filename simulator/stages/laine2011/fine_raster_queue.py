@@ -92,7 +92,7 @@ class Tile(NamedTuple):
 
     depth: np.ndarray  # (samples * 64,) int64
     color: np.ndarray  # (samples * 64,) int64, RGBA from the low byte up
-    owner: np.ndarray  # (samples * 64,) int64: slot of the last write, -1 where there was none
+    owner: np.ndarray  # (samples * 64,) int64: record of the last write, -1 where there was none
     zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only
     before: np.ndarray  # (64,) int64: depth of a pixel before the round, where the round has hit it, and ...
     chain: np.ndarray  # (64,) int64: ... how often

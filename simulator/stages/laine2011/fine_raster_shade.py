@@ -13,8 +13,8 @@ _W, _U, _V = np.int64(4), np.int64(7), np.int64(10)  # where the planes of 1/w, 
 
 
 @kernel(error_model="numpy", lent=True)
-def _plane(planes: Any, slot: Any, at: Any, x: Any, y: Any) -> Any:
-    value = np.int64(planes[slot, at]) * x + np.int64(planes[slot, at + 1]) * y + np.int64(planes[slot, at + 2])
+def _plane(planes: Any, record: Any, at: Any, x: Any, y: Any) -> Any:
+    value = np.int64(planes[record, at]) * x + np.int64(planes[record, at + 1]) * y + np.int64(planes[record, at + 2])
     return np.float32(wrap_int32(value))
 
 
@@ -26,14 +26,14 @@ def _channel(value: Any) -> Any:
 
 
 @kernel(error_model="numpy", lent=True)
-def shade(planes: Any, slot: int, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
+def shade(planes: Any, record: int, colors: Any, x: int, y: int, sample: int, draw: Draw) -> Any:
     """Interpolated vertex colour of one fragment, as 8-bit RGBA.
 
     Parameters
     ----------
     planes : array (S, 16), uint32
-    slot : int
-        Of the fragment's record.
+    record : int
+        The fragment's.
     colors : array (V, 4), float32
     x, y : int
         Pixel.
@@ -48,11 +48,11 @@ def shade(planes: Any, slot: int, colors: Any, x: int, y: int, sample: int, draw
         if sample >= 0:
             at_x = 2 * ((x << s) + SAMPLE_COLUMN[s, sample]) + 1
             at_y = 2 * ((y << s) + sample) + 1
-        w = np.float32(1) / _plane(planes, slot, _W, at_x, at_y)
-        u = w * _plane(planes, slot, _U, at_x, at_y)
-        v = w * _plane(planes, slot, _V, at_x, at_y)
+        w = np.float32(1) / _plane(planes, record, _W, at_x, at_y)
+        u = w * _plane(planes, record, _U, at_x, at_y)
+        v = w * _plane(planes, record, _V, at_x, at_y)
     t = np.float32(1) - u - v
-    i, j, k = planes[slot, 13], planes[slot, 14], planes[slot, 15]
+    i, j, k = planes[record, 13], planes[record, 14], planes[record, 15]
     packed = np.int64(0)
     for c in range(4):
         packed |= _channel(t * colors[i, c] + u * colors[j, c] + v * colors[k, c]) << (8 * c)

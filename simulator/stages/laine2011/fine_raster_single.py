@@ -41,7 +41,9 @@ def count_reads(setup: Setup, draw: Draw, slots: Any, addresses: Any, n: int, pa
 
 
 @kernel(lent=True)
-def _fragment(setup: Setup, colors: Any, draw: Draw, tile: Tile, slot: int, p: int, depth: int, x: int, y: int) -> Any:
+def _fragment(
+    setup: Setup, colors: Any, draw: Draw, tile: Tile, record: int, p: int, depth: int, x: int, y: int
+) -> Any:
     """Depth test and write of one fragment, after all before it; True where it is written."""
     if draw.depth:
         old = tile.depth[p]
@@ -50,9 +52,9 @@ def _fragment(setup: Setup, colors: Any, draw: Draw, tile: Tile, slot: int, p: i
         if old == tile.state[ZMAX]:
             tile.state[UPDATE] = 1
         tile.depth[p] = depth
-    tile.owner[p] = slot
+    tile.owner[p] = record
     if draw.blend:
-        tile.color[p] = blend_over(shade(setup.planes, slot, colors, x, y, -1, draw), tile.color[p])
+        tile.color[p] = blend_over(shade(setup.planes, record, colors, x, y, -1, draw), tile.color[p])
     return True
 
 
@@ -64,11 +66,12 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
     test in order writes the same.
     """
     state, n, kept, writes, longest, hit = tile.state, 0, 0, 0, 0, np.uint64(0)
-    head, tail, records = state[HEAD], state[TAIL], setup.planes
+    head, tail, planes = state[HEAD], state[TAIL], setup.planes
     queued = min(tail - head, WARP)
     while n < WARP and head < tail:
         slot, mask = tile.slots[head], tile.masks[head]
-        zx, zy, zb = np.int64(records[slot, 0]), np.int64(records[slot, 1]), np.int64(records[slot, 2])
+        record = np.int64(setup.records[slot])
+        zx, zy, zb = np.int64(planes[record, 0]), np.int64(planes[record, 1]), np.int64(planes[record, 2])
         while n < WARP and mask != np.uint64(0):
             p = lowest_bit(mask)
             bit = mask & (~mask + np.uint64(1))
@@ -84,7 +87,7 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
                 tile.pixel[kept] = slot
                 kept += passes
             n += 1
-            written = _fragment(setup, colors, draw, tile, slot, p, depth, x, y)
+            written = _fragment(setup, colors, draw, tile, record, p, depth, x, y)
             if row is not None:
                 writes += written
                 tile.chain[p] += passes if draw.later_wins else written

@@ -75,7 +75,7 @@ def _holds_site(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, x: int, y:
     return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
 
 
-@kernel(lent=True)
+@kernel(lent=True, inline=True)
 def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View, sign: int) -> Any:
     """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
     q = SUBPIXELS >> view.log_samples
@@ -93,7 +93,7 @@ def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view:
     return not _holds_site(ax, ay, bx, by, cx, cy, high_x - x, high_y - y, sign), 2
 
 
-@kernel(lent=True)
+@kernel(lent=True, inline=True)
 def cull(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View) -> Any:
     """Outcome of the culls that follow snapping, twice the area, and the sample sites that were looked at.
 
@@ -126,7 +126,7 @@ def _lesser(a: Any, b: Any) -> Any:
     return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
 
 
-@kernel(error_model="numpy", lent=True)
+@kernel(error_model="numpy", lent=True, inline=True)
 def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
     headers[slot, 0], headers[slot, 1] = np.int16(a.sx & 0xFFFF), np.int16(a.sy & 0xFFFF)

@@ -65,7 +65,11 @@ def _setup_range(
     vertices: Any,
     table: Any,
 ) -> None:
-    """All triangles of some whole blocks; those with two or more sub-triangles are only counted here."""
+    """All triangles of some whole blocks; those with two or more sub-triangles are only counted here.
+
+    Records follow each other from the first triangle's own place on.
+    """
+    record = np.int64(begin)
     for warp in range(begin, end, WARP):
         last = min(warp + WARP, end)
         for t in range(warp, last):
@@ -73,10 +77,11 @@ def _setup_range(
             kept = fan = 0
             if outcome == KEPT:
                 kept = 1
-                store_whole(screen, positions, triangles, t, area, view, out)
+                store_whole(screen, positions, triangles, t, record, area, view, out)
             elif outcome == CLIPPED:
-                kept, fan = clip_and_store(scratch, positions, view, out, np.int64(-1), t, triangles)
-            out.first[t], out.subtriangles[t] = t, kept
+                kept, fan = clip_and_store(scratch, positions, view, out, np.int64(-1), record, t, triangles)
+            out.subtriangles[t] = kept
+            record += kept == 1
             if table is not None:
                 bit = 1 << (t - warp)
                 counting.lanes[outcome] |= bit
@@ -121,8 +126,8 @@ def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out
     """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
     scratch = new_scratch()
     for t in several:
-        out.misc[t] = out.first[t]
-        clip_and_store(scratch, positions, view, out, np.int64(out.first[t]), t, triangles)
+        first = np.int64(out.misc[t])
+        clip_and_store(scratch, positions, view, out, first, first, t, triangles)
 
 
 def as_published(switch: bool | None, release: Release) -> bool:
@@ -258,7 +263,7 @@ def triangle_setup(
         capacity = F + SLACK if capacity is None else capacity
         if len(several) and needed <= capacity:
             out = _grown(out, needed)
-            out.first[several] = F + np.cumsum(counts) - counts
+            out.misc[several] = F + np.cumsum(counts) - counts
             _setup_several(several, positions, triangles, view, out)
     facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
     if not counting:
@@ -280,9 +285,9 @@ def triangle_setup(
 def _empty_setup(F: int, slots: int, release: Release) -> Setup:
     return Setup(
         subtriangles=np.zeros(F, np.uint8),
-        first=np.empty(F, np.int32),
         headers=np.zeros((slots, 6), np.int16),
         misc=np.zeros(slots, np.uint32),
+        records=np.zeros(slots, np.int32),
         planes=np.zeros((slots, 16 if release == "1.1" else 4), np.uint32),
         inputs=np.zeros(slots, np.int32),
     )
@@ -290,5 +295,5 @@ def _empty_setup(F: int, slots: int, release: Release) -> Setup:
 
 def _grown(setup: Setup, slots: int) -> Setup:
     """Make room for more slots."""
-    longer = [np.concatenate([a, np.zeros((slots - len(a), *a.shape[1:]), a.dtype)]) for a in setup[2:]]
-    return Setup(setup.subtriangles, setup.first, *longer)
+    longer = [np.concatenate([a, np.zeros((slots - len(a), *a.shape[1:]), a.dtype)]) for a in setup[1:]]
+    return Setup(setup.subtriangles, *longer)

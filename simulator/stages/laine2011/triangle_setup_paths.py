@@ -29,16 +29,17 @@ GUARD_BAND = 32767  # 1/16 pixel; the largest span, too, that the coverage table
 class Setup(NamedTuple):
     """What triangle setup leaves in memory; F input triangles, S slots.
 
-    A triangle with one sub-triangle has it in slot t, its own; one with m >= 2 has them in ``first[t]`` and the m - 1
-    slots that follow, all beyond F, allocated in input order.
+    A triangle with one sub-triangle has it in slot t, its own; one with m >= 2 has them in ``misc[t]`` and the m - 1
+    slots that follow, all beyond F, allocated in input order. Headers lie at their slots; data records lie side by
+    side, so that those of what is culled take no memory.
     """
 
     subtriangles: NDArray[np.uint8]  # (F,) sub-triangles of each triangle, 0 to 7
-    first: NDArray[np.int32]  # (F,) slot of the first
     headers: NDArray[np.int16]  # (S, 6) snapped x, y of three vertices, 1/16 pixel from the viewport's centre
     misc: NDArray[np.uint32]  # (S,) least depth, rounded down to a multiple of 4096, and 12 bits of flips
-    planes: NDArray[np.uint32]  # (S, 16) or, nvdiffrast, (S, 4): the data record
-    inputs: NDArray[np.int32]  # (S,) input triangle
+    records: NDArray[np.int32]  # (S,) which data record a slot that is written has
+    planes: NDArray[np.uint32]  # (S, 16) or, nvdiffrast, (S, 4): the data records
+    inputs: NDArray[np.int32]  # (S,) input triangle, by record
 
 
 class Scratch(NamedTuple):
@@ -63,23 +64,23 @@ def new_scratch() -> Any:
 
 @kernel(lent=True)
 def _store(
-    a: Corner, b: Corner, c: Corner, area: int, view: View, out: Setup, slot: int, t: int, triangles: Any
+    a: Corner, b: Corner, c: Corner, area: int, view: View, out: Setup, slot: int, record: int, t: int, triangles: Any
 ) -> None:
     """Write header and data record of one sub-triangle; a clockwise one with vertices 1 and 2 swapped."""
     if area < 0:
         b, c, area = c, b, -area
     store_header(a, b, c, view, out.headers, out.misc, slot)
-    out.inputs[slot] = t
+    out.records[slot], out.inputs[record] = record, t
     mantissa, shift = reciprocal_area(area)
     if view.depth:
-        store_depth_plane(a, b, c, mantissa, shift, view, out.planes, slot)
+        store_depth_plane(a, b, c, mantissa, shift, view, out.planes, record)
     if out.planes.shape[1] == 4:
-        out.planes[slot, 3] = np.uint32(t + 1)
+        out.planes[record, 3] = np.uint32(t + 1)
         return
     if view.interpolate:
-        store_attribute_planes(a, b, c, mantissa, shift, view, out.planes, slot)
+        store_attribute_planes(a, b, c, mantissa, shift, view, out.planes, record)
     for k in range(3):
-        out.planes[slot, 13 + k] = np.uint32(triangles[t, k])
+        out.planes[record, 13 + k] = np.uint32(triangles[t, k])
 
 
 @kernel(lent=True)
@@ -91,7 +92,9 @@ def _fan_corner(clip: Any, polygon: Any, i: int, view: View) -> Any:
 
 
 @kernel(lent=True)
-def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
+def _fan(
+    clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, record: int, t: int, triangles: Any
+) -> Any:
     """Count the surviving triangles of a clipped polygon; from ``slot`` on, where not negative, write them."""
     kept = 0
     if n < 3:
@@ -102,13 +105,13 @@ def _fan(clip: Any, polygon: Any, n: int, view: View, out: Setup, slot: int, t: 
         outcome, area, _ = cull(a.sx, a.sy, b.sx, b.sy, c.sx, c.sy, view)
         if i >= 2 and outcome == KEPT:
             if slot >= 0:
-                _store(a, b, c, area, view, out, slot + kept, t, triangles)
+                _store(a, b, c, area, view, out, slot + kept, record + kept, t, triangles)
             kept += 1
         b = c
     return kept
 
 
-@kernel(lent=True)
+@kernel(lent=True, inline=True)
 def whole_outcome(screen: Screen, triangles: Any, t: int, view: View) -> Any:
     """Outcome of a triangle if it needs no clipping (``CLIPPED`` if it does), its area, and the sites looked at."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -128,32 +131,36 @@ def whole_outcome(screen: Screen, triangles: Any, t: int, view: View) -> Any:
     return cull(ax, ay, bx, by, cx, cy, view)
 
 
-@kernel(lent=True)
+@kernel(lent=True, inline=True)
 def _corner(screen: Screen, positions: Any, i: int, u: Any, v: Any) -> Any:
     """Make a corner of an input vertex."""
     place, ratio = screen.places[i], screen.ratios[i]
     return Corner(np.int64(place[0]), np.int64(place[1]), ratio[0], ratio[1], positions[i, 3], u, v)
 
 
-@kernel(lent=True)
-def store_whole(screen: Screen, positions: Any, triangles: Any, t: int, area: int, view: View, out: Setup) -> None:
+@kernel(lent=True, inline=True)
+def store_whole(
+    screen: Screen, positions: Any, triangles: Any, t: int, record: int, area: int, view: View, out: Setup
+) -> None:
     """Write a triangle that needs no clipping to its own slot."""
     zero, one = np.float32(0), np.float32(1)
     a = _corner(screen, positions, triangles[t, 0], zero, zero)
     b = _corner(screen, positions, triangles[t, 1], one, zero)
     c = _corner(screen, positions, triangles[t, 2], zero, one)
-    _store(a, b, c, area, view, out, t, t, triangles)
+    _store(a, b, c, area, view, out, t, record, t, triangles)
 
 
 @kernel(lent=True)
-def clip_and_store(scratch: Scratch, positions: Any, view: View, out: Setup, slot: int, t: int, triangles: Any) -> Any:
+def clip_and_store(
+    scratch: Scratch, positions: Any, view: View, out: Setup, slot: int, record: int, t: int, triangles: Any
+) -> Any:
     """Clip one triangle and write what survives (a single survivor to the own slot); returns survivors and fan size."""
     clip, polygon = scratch.clip, scratch.polygon
     for k in range(3):
         for c in range(4):
             clip[k, c] = positions[triangles[t, k], c]
     n = clip_triangle(clip, polygon, scratch.spare, scratch.plane, scratch.steps)
-    kept = _fan(clip, polygon, n, view, out, slot, t, triangles)
+    kept = _fan(clip, polygon, n, view, out, slot, record, t, triangles)
     if kept == 1 and slot < 0:
-        _fan(clip, polygon, n, view, out, t, t, triangles)
+        _fan(clip, polygon, n, view, out, t, record, t, triangles)
     return kept, max(n - 2, 0)

@@ -16,7 +16,7 @@ def setup_streams(out: Setup, V: int, vertices: NDArray[np.int64], view: View) -
     and writes to one line meet in L2, so that each buffer passes once; vertices again for each block that asks, where
     no texture cache holds them. Records are written in sectors of 32 bytes.
     """
-    F, positions = len(out.first), V * POSITION_BYTES
+    F, positions = len(out.subtriangles), V * POSITION_BYTES
     sectors, lines = vertices.tolist()
     kept = int(out.subtriangles.sum(dtype=np.int64))
     headers, data = kept * HEADER_BYTES, kept * out.planes.shape[1] * 4
