@@ -21,6 +21,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
+from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES
 
 WIDTH, HEIGHT = 1600, 1200
 MILLIONS = (0.01, 0.1, 1.0, 4.8)
@@ -52,11 +53,10 @@ def main() -> None:
 
 def drawers(scene: Any) -> dict[str, Draw]:
     """What draws the scene, by name: ours with every counter and without, and the peers that are installed."""
+    options = CudarasterOptions(batches=1 + len(scene.mesh.triangles) // MAX_SUBTRIANGLES)  # a draw takes no more
 
     def ours(*, counting: bool) -> Draw:
-        return lambda: cudaraster(
-            scene, np.eye(4), WIDTH, HEIGHT, Simt(), CudarasterOptions(), Executor(counting=counting)
-        )
+        return lambda: cudaraster(scene, np.eye(4), WIDTH, HEIGHT, Simt(), options, Executor(counting=counting))
 
     found: dict[str, Draw] = {COUNTED: ours(counting=True), UNCOUNTED: ours(counting=False)}
     for name, make in ((PIPE, llvmpipe), ("datashader", datashader), ("plain scan", plain_scan)):
