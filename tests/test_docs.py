@@ -115,8 +115,9 @@ def test_the_atlas_shows_what_a_results_folder_has(generate, tmp_path, monkeypat
     )
     monkeypatch.setenv("TILESTAMP_RESULTS", str(tmp_path))
     made = generate("result_pages").pages()
-    assert made["atlas/stability-cracks-cracks.png"] == b"plot"
-    assert "| m | p\\|q | u | 1.2346 |  | w | c |  |" in made["atlas.md"]
+    assert made["atlas/cracks-cracks.png"] == b"plot"
+    assert "| m | p\\|q [u] | 1.2346 |  | w; cure: c |" in made["atlas.md"]
+    assert '<a href="#cracks"><img src="atlas/cracks-cracks.png"' in made["atlas.md"]
     assert "`tilestamp reproduce stability/slivers` draws it" in made["atlas.md"]
 
 

@@ -116,7 +116,7 @@ def test_the_limit_that_takes_nearly_all_of_a_stage_is_coloured_most(run):
     html = Parsed(run._repr_html_())
     strengths = [float(attrs["style"].rpartition(",")[2].strip(" )")) for _, attrs in html.tags if "style" in attrs]
     terms = run.stages.filter(regex="_ms$").fillna(0.0).to_numpy() / run.stages["milliseconds"].to_numpy()[:, None]
-    assert max(strengths) == pytest.approx(0.6 * min(1.0, terms.max()), abs=0.01)
+    assert max(strengths) == pytest.approx(0.5 * min(1.0, terms.max()), abs=0.01)
 
 
 def test_a_card_escapes_what_it_is_told():

@@ -32,14 +32,15 @@ def pages() -> dict[str, str | bytes]:
     """The index, and a page for each machine."""
     names = list_machines()
     rows = [_row(name, about) for name, about in names.items()]
-    index = INTRODUCTION + table(["machine", "what it is", "compute capability", *KINDS], rows)
+    index = INTRODUCTION + table(["machine", "what it is", "compute capability", "numbers"], rows)
     return {"machines/index.md": index} | {f"machines/{name}.md": _page(name) for name in names}
 
 
 def _row(name: str, about: str) -> list[object]:
     machine = load_machine(name)
     counts = Counter(kind for kind, _ in machine.provenance.values())
-    return [f"[{name}]({name}.md)", about, machine.compute_capability, *(counts[kind] or "" for kind in KINDS)]
+    told = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS if counts[kind])
+    return [f"[{name}]({name}.md)", about, machine.compute_capability, told]
 
 
 def _page(name: str) -> str:

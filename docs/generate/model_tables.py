@@ -56,7 +56,7 @@ def silicon() -> str:
     """What L2 and the launch of blocks do on an H200, measured and by the model."""
     h200 = load_machine("h200")
     rows = [*_found(h200), *_stores(h200), *_starts(h200)]
-    return table(["", "measured on the H200", "model"], rows)
+    return table(["what", "measured on the H200", "model"], rows)
 
 
 def _found(h200: Machine) -> list[list[str]]:
@@ -128,7 +128,7 @@ def _rasters(work: Work | FixedFunctionWork) -> bool:
 def _columns() -> list[str]:
     tiles = ", ".join(str(int(line.tile_size)) for line in published(table1.__file__, "table1").itertuples())
     return [
-        "", f"Table 1: address calculation at tiles of {tiles}, ms", "Table 3: setup, ms", "sampling, ms",
+        "with", f"Table 1: address calculation at tiles of {tiles}, ms", "Table 3: setup, ms", "sampling, ms",
         "sampling of the hybrid, ms", "Table 2: mean error; worst",
     ]  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from html import escape
 from importlib import import_module
 from inspect import cleandoc
@@ -35,7 +36,6 @@ bisection on a small picture, and pinned by a test.
 tilestamp reproduce stability
 ```
 """
-COLUMNS = ["method", "parameter", "unit", "holds", "breaks", "wrong", "cure", "cost"]
 
 
 def pages() -> dict[str, str | bytes]:
@@ -59,26 +59,30 @@ def _experiments() -> str:
         groups.setdefault(name.split("/", maxsplit=1)[0], []).append(name)
     for group, names in groups.items():
         rows = [[f"`{name}`", describe(name), "slow" if is_slow(name) else ""] for name in names]
-        text += f"\n## {describe_folder(group).rstrip('.')}\n\n{table(['experiment', 'question', ''], rows)}"
+        text += f"\n## {describe_folder(group).rstrip('.')}\n\n{table(['experiment', 'question', 'time'], rows)}"
     return text
 
 
 def _atlas(folder: Path | None) -> dict[str, str | bytes]:
-    text = ATLAS_HEAD
     made: dict[str, str | bytes] = {}
+    thumbnails, sections = "", ""
     for name in experiment_names():
-        if name.startswith(f"{ATLAS}/"):
-            result = folder / name.replace("/", "-") if folder else None
-            text += f"\n## {describe(name).rstrip('.')}\n\n{_about(name)}\n"
-            if result is None or not result.is_dir():
-                text += f"\n`tilestamp reproduce {name}` draws it.\n"
-                continue
-            text += _boundaries(result)
-            for path in sorted(result.glob("*.png")):
-                place = f"atlas/{result.name}-{path.name}"
-                made[place] = path.read_bytes()
-                text += f"\n![{escape(_alt(result, path.name, describe(name)))}]({place}){{ loading=lazy }}\n"
-    return {"atlas.md": text} | made
+        if not name.startswith(f"{ATLAS}/"):
+            continue
+        short, title = name.partition("/")[2], describe(name).rstrip(".")
+        result = folder / name.replace("/", "-") if folder else Path()
+        plots = {f"atlas/{short}-{path.name}": path for path in sorted(result.glob("*.png"))} if folder else {}
+        made |= {place: path.read_bytes() for place, path in plots.items()}
+        drawn = [f"![{_alt(result, path.name, title)}]({place}){{ loading=lazy }}" for place, path in plots.items()]
+        drawn = drawn or [f"`tilestamp reproduce {name}` draws it."]
+        parts = [f"## {title} {{ #{short} }}", _about(name), *drawn, _boundaries(result)]
+        sections += "\n\n".join(parts) + "\n\n"
+        if plots:
+            thumbnails += (
+                f'<a href="#{short}"><img src="{next(iter(plots))}" alt="" loading="lazy">{escape(short)}</a>\n'
+            )
+    made["atlas.md"] = f'{ATLAS_HEAD}\n<div class="thumbnails">\n{thumbnails}</div>\n\n{sections}'
+    return made
 
 
 def _about(name: str) -> str:
@@ -88,11 +92,20 @@ def _about(name: str) -> str:
 
 
 def _boundaries(result: Path) -> str:
+    """Where each method breaks, folded."""
     found = result / "boundaries.csv"
     if not found.is_file():
         return ""
-    rows = pd.read_csv(found, keep_default_na=False)[COLUMNS]
-    return "\n" + table(COLUMNS, [[_short(value) for value in row] for row in rows.itertuples(index=False)])
+    rows = [
+        [row["method"], f"{row['parameter']} [{row['unit']}]", _short(row["holds"]), _short(row["breaks"]), _told(row)]
+        for row in pd.read_csv(found, dtype=str, keep_default_na=False).to_dict("records")
+    ]
+    return f"### Boundaries\n\n{table(['method', 'parameter', 'holds', 'breaks', 'what goes wrong, and a cure'], rows)}"
+
+
+def _told(row: Mapping[str, str]) -> str:
+    cure = f"; cure: {row['cure']}" * bool(row["cure"]) + f" ({row['cost']})" * bool(row["cost"])
+    return row["wrong"] + cure
 
 
 def _short(value: object) -> str:
