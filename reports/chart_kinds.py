@@ -119,6 +119,7 @@ def front(
 
     data, picked = _picked(text, pick or {})
     shown = data.transform_filter(f"datum['{x}'] > 0 && isValid(datum['{y}'])")
+    rows = [row for row in read_rows(text) if float(row[x] or 0) > 0 and row[y]]
     only = alt.selection_point(name="only", fields=[color], bind="legend")
     scale = alt.Scale(type="symlog", constant=_least(text, y)) if log_y else alt.Scale()
     axes = {
@@ -127,8 +128,8 @@ def front(
     }
     points = shown.mark_point(size=60, filled=True).encode(
         **axes,
-        color=_colour(text, color),
-        shape=alt.Shape(f"{color}:N"),
+        color=alt.Color(f"{color}:N", scale=(same := alt.Scale(domain=_order(rows, color)))),
+        shape=alt.Shape(f"{color}:N", scale=same),  # or it has a legend of its own
         opacity=alt.condition(only, alt.value(0.9), alt.value(FADED)),
         tooltip=[f"{label}:N", alt.Tooltip(f"{x}:Q", format=".4"), alt.Tooltip(f"{y}:Q", format=".4")],
     )
@@ -157,7 +158,7 @@ def lines(
         .encode(
             x=alt.X(f"{x}:Q", scale=scale, title=titles[0]),
             y=alt.Y(f"{y}:Q", scale=scale, title=titles[1]),
-            color=_colour(text, color),
+            color=alt.Color(f"{color}:N", sort=_order(read_rows(text), color)),
             tooltip=[f"{color}:N", f"{x}:Q", alt.Tooltip(f"{y}:Q", format=".4")],
         )
         .add_params(*picked)
@@ -226,10 +227,7 @@ def _least(text: str, column: str) -> float:
     return min((value for value in values if value > 0), default=1.0)
 
 
-def _colour(text: str, column: str) -> "alt.Color":
-    """A colour a value, numbers in their order."""
-    import altair as alt
-
-    values = list(dict.fromkeys(row[column] for row in read_rows(text)))
-    ordered = sorted(values, key=float) if all(value.replace(".", "").isdigit() for value in values) else values
-    return alt.Color(f"{column}:N", sort=ordered)
+def _order(rows: Sequence[Mapping[str, str]], column: str) -> list[str]:
+    """Values of a column for a legend, numbers in their order."""
+    values = list(dict.fromkeys(row[column] for row in rows))
+    return sorted(values, key=float) if all(value.replace(".", "").isdigit() for value in values) else values

@@ -82,7 +82,7 @@ def _points(rows: Sequence[dict[str, Any]], ends: Ends) -> "alt.Chart":
     paper = alt.selection_point(name="paper", fields=["paper"], bind="legend")
     domain = [alt.ExprRef(f"shown == '{kinds[0]}' ? {ends[kinds[0]][k]} : {ends[kinds[-1]][k]}") for k in (0, 1)]
     log = alt.Scale(type="log", domain=domain, nice=False, clamp=True)
-    colour = alt.Color("paper:N", title="click to single out", legend=alt.Legend(columns=3))
+    colour = alt.Color("paper:N", title="click to single out")
     points: alt.Chart = (
         alt.Chart(data_of(write_rows(rows)))
         .transform_filter("datum.kind == shown")

@@ -6,6 +6,7 @@ called predicted, large errors left out, a page without marks.
 
 import json
 import re
+from dataclasses import replace
 from functools import cache
 
 import pandas as pd
@@ -64,6 +65,11 @@ def test_the_printed_table_holds_every_cell(capsys):
         assert " ".join(" ".join(cell_texts(cell)[:PRINTED]).split()) in lines
     assert PREDICTED in lines
     assert "- a note" in lines
+
+
+def test_a_printed_table_has_no_empty_column(capsys):
+    command._print_result(replace(MADE, cells=[Cell("a", "size", "px", published=None, ours=3.0, status="reported")]))
+    assert "row column unit ours status" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
 
 def runs(monkeypatch, *outcomes):

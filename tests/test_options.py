@@ -196,7 +196,15 @@ def test_text_becomes_what_the_option_takes(arguments, option, value, capsys):
     assert json.loads(capsys.readouterr().out)["options"][option] == value
 
 
-@pytest.mark.parametrize("arguments", [["list", "options"], ["list", "scenes", "tiled"]])
-def test_options_are_those_of_a_pipeline(arguments, capsys):
+def test_list_alone_says_what_can_be_listed(capsys):
+    assert run_command(["list"]) == BAD_INPUT
+    assert "machines, experiments, options PIPELINE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "right"),
+    [(["list", "options"], "list options PIPELINE"), (["list", "scenes", "tiled"], "list scenes")],
+)
+def test_a_name_goes_with_what_belongs_to_something(arguments, right, capsys):
     assert run_command(arguments) == BAD_INPUT
-    assert "list options PIPELINE" in capsys.readouterr().err
+    assert f"write: tilestamp {right}\n" in capsys.readouterr().err

@@ -150,6 +150,16 @@ def test_a_plot_has_its_place_before_it_is_loaded(visit, width):
 
 
 @pytest.mark.parametrize("width", [NARROW, WIDE])
+def test_each_chart_has_one_legend_at_most_and_none_is_cut(visit, width):
+    page = visit(width)
+    for view in page.locator(".view").all():
+        assert view.locator(".role-legend").count() <= 1
+        edge = view.bounding_box()["x"] + view.bounding_box()["width"]
+        for entry in view.locator(".role-legend-label text").all():
+            assert entry.bounding_box()["x"] + entry.bounding_box()["width"] <= edge
+
+
+@pytest.mark.parametrize("width", [NARROW, WIDE])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(visit, width, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not here")

@@ -9,8 +9,8 @@ import pytest
 from tilestamp.experiments.command_line import run_command
 from tilestamp.experiments.harness import validity
 from tilestamp.experiments.harness.folder import rebuild, stored
-from tilestamp.experiments.harness.record import result_of, strict
-from tilestamp.experiments.harness.registry import experiment_names, question
+from tilestamp.experiments.harness.record import FORMAT, result_of, strict
+from tilestamp.experiments.harness.registry import experiment_names, folder_name, question
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.harness.validity import code_digest, made_from, outdated
 from tilestamp.experiments.harness.write import Making, write_result
@@ -223,6 +223,20 @@ def test_the_page_is_made_from_the_folder_alone(tmp_path, runs):
     assert run_command(["page", "-o", str(tmp_path)]) == 0
     assert runs == [NAME]
     assert (tmp_path / "index.html").read_text() == made
+
+
+def test_a_result_that_another_version_wrote_is_none(written):
+    path = written / folder_name(NAME) / "result.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"format": FORMAT - 1, "stand_ins": ["as it was"]}))
+    assert outdated(written, NAME) == "another version of tilestamp wrote it"
+    assert stored(written) == []
+
+
+def test_stand_ins_without_a_cell_of_theirs_are_said_too(tmp_path):
+    made = Making(used={"stand-ins": {"killeroo": {"killeroo.bpt"}}}, made_from=made_from(NAME))
+    write_result(RESULT, tmp_path, made)
+    (advice,) = rebuild(tmp_path)[1]
+    assert advice.startswith("stand-ins were drawn: put killeroo.bpt")
 
 
 def test_a_page_over_nothing_is_refused(tmp_path, capsys):

@@ -1,6 +1,6 @@
 """``tilestamp list``: what there is, a line each; and what belongs to one pipeline, machine or scene."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from cyclopts import Parameter
 
@@ -22,7 +22,7 @@ Table = dict[str, dict[str, Any]]
 
 
 def catalogue(
-    kind: Kind,
+    kind: Kind | None = None,
     name: str | None = None,
     /,
     *,
@@ -42,6 +42,9 @@ def catalogue(
     json_
         Print a JSON object instead of lines.
     """
+    if kind is None:
+        kinds = ", ".join(f"{each} {OF.get(each, '')}".strip() for each in get_args(Kind))
+        raise TilestampError(f"say what to list: {kinds}")
     if (kind in OF) != (name is not None) or (machine and kind != "options"):
         wanted = f"tilestamp list {kind} {OF.get(kind, '')}".strip()
         raise TilestampError(f"write: {wanted}{'; --machine goes with options' if machine else ''}")

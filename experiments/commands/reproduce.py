@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from tilestamp.experiments.commands.outputs import write_json
 from tilestamp.experiments.commands.scoreboard import print_scoreboard
-from tilestamp.experiments.commands.tables import print_table
+from tilestamp.experiments.commands.tables import print_lines, print_table
 from tilestamp.experiments.commands.terminal import progress
 from tilestamp.experiments.harness.folder import rebuild, stored
 from tilestamp.experiments.harness.jobs import default_jobs, run_experiments
@@ -22,6 +22,7 @@ from tilestamp.experiments.harness.validity import outdated
 from tilestamp.models.errors import TilestampError
 
 RESULTS = Path("reports") / "results"
+KEYS = 2  # columns that say what a cell is
 FAILED = 1  # exit code where an experiment gave no result
 
 
@@ -109,7 +110,8 @@ def _print_failures(failed: list[Outcome]) -> int:
 def _print_end(output: Path, page: Path, valid: int, left: set[str]) -> None:
     """Say where everything is, what was not run again, and what was left out for its time."""
     if valid:
-        sys.stdout.write(f"Valid already, and not run again but with --again: {valid}\n")
+        results = "1 result was" if valid == 1 else f"{valid} results were"
+        sys.stdout.write(f"{results} valid and not run again (--again runs them)\n")
     if left:
         sys.stdout.write(f"{len(left)} experiments take longer and were not run (name them, or --all)\n")
     sys.stdout.write(f"CSV, manifests and plots: {output}; the page: {page}\n")
@@ -117,17 +119,16 @@ def _print_end(output: Path, page: Path, valid: int, left: set[str]) -> None:
 
 def _print_result(result: Result) -> None:
     """Print one result as a table, with its warnings above and its notes below."""
-    sys.stdout.write("\n")
-    for warning in result.warnings:
-        sys.stdout.write(f"! {warning}\n")
+    asked = f"{question(result.experiment)} {answered(result)}".strip()
+    print_lines("", *(f"! {warning}" for warning in result.warnings), asked)
     title = f"{result.title} [{result.name}]"
-    sys.stdout.write(f"{question(result.experiment)} {answered(result)}".strip() + "\n")
     if result.cells:
-        rows = [cell_texts(cell)[:PRINTED] for cell in result.cells]
+        texts = [cell_texts(cell)[:PRINTED] for cell in result.cells]
+        shown = [index for index, column in enumerate(zip(*texts, strict=True)) if index < KEYS or any(column)]
+        rows = [[row[index] for index in shown] for row in texts]
         styles = ["dim" if c.status in {"fitted", "stand-in"} else "bold red" if c.missed else "" for c in result.cells]
-        print_table(title, COLUMNS[:PRINTED], rows, styles, keys=2)
+        print_table(title, [COLUMNS[index] for index in shown], rows, styles, keys=KEYS)
     else:
-        sys.stdout.write(f"{title}\n")
-    sys.stdout.writelines(f"{sentence}\n" for sentence in averages(result))
-    sys.stdout.writelines(f"- {note}\n" for note in (*fitted_numbers(result), *result.notes))
+        print_lines(title)
+    print_lines(*averages(result), *(f"- {note}" for note in (*fitted_numbers(result), *result.notes)))
     sys.stdout.flush()  # as they come, into a file too

@@ -27,7 +27,8 @@ def print_scoreboard(rows: Sequence[Row], advice: Sequence[str]) -> None:
         print_lines("", "Questions beside which nothing is published", style="bold")
         print_words([line for group, some in _named(others) for line in ((group, ""), *map(_answer, some))])
     said = score_text(total(rows)) or "nothing that is published was compared"
-    print_lines("", f"All {len(rows)}: {said}.", *(f"! {sentence}" for sentence in advice))
+    count = "1 experiment" if len(rows) == 1 else f"{len(rows)} experiments"
+    print_lines("", f"{count}: {said}.", *(f"! {sentence}" for sentence in advice))
 
 
 def _answer(row: Row) -> tuple[str, str]:
@@ -86,7 +87,8 @@ def _kinds(row: Row) -> list[tuple[str, ...]]:
         lines.append((str(row.orders.of), "orders", "", "", f"{row.orders.right}/{row.orders.of}"))
     others = {"fitted": row.fitted, "partly fitted": row.partly_fitted, "stand-ins": row.stand_ins}
     others["reproduced"] = row.reproduced
-    return [*lines, *((str(number), kind, "", "", "") for kind, number in others.items() if number)]
+    lines += [(str(number), kind, "", "", "") for kind, number in others.items() if number]
+    return [(number, kind.removesuffix("s") if number == "1" else kind, *rest) for number, kind, *rest in lines]
 
 
 def _texts(errors: Errors) -> tuple[str, str, str, str]:

@@ -56,9 +56,10 @@ def advice(records: Sequence[Record], rows: Sequence[Row]) -> list[str]:
     if absent:
         files = ", ".join(absent)
         number = sum(row.stand_ins for row in rows)
+        cells = f"{number} {'cell' if number == 1 else 'cells'} of stand-ins say nothing of the model"
         said.append(
-            f"{number} {'cell' if number == 1 else 'cells'} of stand-ins say nothing of the model: put {files} into a "
-            f"folder, name that folder in {SCENES_VARIABLE}, and reproduce: what they change is run again"
+            f"{cells if number else 'stand-ins were drawn'}: put {files} into a folder, name that folder in "
+            f"{SCENES_VARIABLE}, and reproduce: what they change is run again"
         )
     lacking = [(r["experiment"], " ".join(r["warnings"])) for r in records if r["state"] == NOT_RUN]
     said += [f"{name} was not run: {why.removeprefix('not run: ')}" for name, why in lacking]

@@ -41,9 +41,11 @@ def averages(result: Result) -> list[str]:
 
 
 def errors_text(errors: Errors, what: str) -> str:
-    """Number, mean and worst of some errors; nothing where there are none."""
+    """Number, mean and worst of some errors; nothing where there are none. ``what`` is in the plural."""
     if errors.mean is None or errors.worst is None:
         return ""
+    if errors.number == 1:
+        return f"1 {what.removesuffix('s')}: error {percent(errors.worst)} %"
     return f"{errors.number:,} {what}: mean error {percent(errors.mean)} %, worst {percent(errors.worst)} %"
 
 

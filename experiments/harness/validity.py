@@ -24,7 +24,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tilestamp.experiments.harness.record import NOT_RUN
+from tilestamp.experiments.harness.record import FORMAT, NOT_RUN
 from tilestamp.experiments.harness.registry import folder_name
 from tilestamp.experiments.harness.sources import ROOT, reached
 from tilestamp.simulator.manifest import DIGITS, PACKAGES
@@ -94,6 +94,8 @@ def outdated(output: Path, experiment: str) -> str:
         record = json.loads((folder / "result.json").read_text("utf-8"))
     except (OSError, ValueError):
         return "there is no result yet"
+    if record.get("format") != FORMAT:
+        return "another version of tilestamp wrote it"
     if record["state"] == NOT_RUN:
         return "it lacked an input"
     return _changed(manifest.get("made from", {}), made_from(experiment)) or _moved(manifest.get(FILES, {}))

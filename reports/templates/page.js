@@ -3,6 +3,7 @@
 for (const view of document.querySelectorAll("[data-spec]")) {
   const spec = JSON.parse(document.getElementById(view.dataset.spec).textContent);
   if (spec.usermeta && spec.usermeta.ratio) spec.height = Math.round(view.clientWidth * spec.usermeta.ratio);
+  spec.config.legend.columns = Math.max(1, Math.floor(view.clientWidth / 170)); // entries of a legend side by side
   const still = view.querySelector("img");
   const options = { renderer: "svg", actions: false, loader: { target: "_self" }, ast: false };
   vegaEmbed(view, spec, options).then(() => view.classList.add("live"), () => view.replaceChildren(still));
