@@ -126,16 +126,19 @@ def front(
         "x": alt.X(f"{x}:Q", scale=alt.Scale(type="log"), title=titles[0]),
         "y": alt.Y(f"{y}:Q", scale=scale, title=titles[1]),
     }
-    points = shown.mark_point(size=60, filled=True).encode(
+    drawn = shown.mark_point(size=60, filled=True).encode(
         **axes,
         color=alt.Color(f"{color}:N", scale=(same := alt.Scale(domain=_order(rows, color)))),
         shape=alt.Shape(f"{color}:N", scale=same),  # or it has a legend of its own
         opacity=alt.condition(only, alt.value(0.9), alt.value(FADED)),
         tooltip=[f"{label}:N", alt.Tooltip(f"{x}:Q", format=".4"), alt.Tooltip(f"{y}:Q", format=".4")],
     )
-    steps = shown.transform_filter(f"datum['{front}'] == 'True'" if front else "false")
+    points: alt.Chart = drawn.add_params(only, *picked)
+    if not front:
+        return points
+    steps = shown.transform_filter(f"datum['{front}'] == 'True'")
     line = steps.mark_line(interpolate="step-after", color=INK, strokeWidth=1).encode(**axes)
-    return alt.layer(line, points.add_params(only, *picked))
+    return alt.layer(line, points)
 
 
 def lines(

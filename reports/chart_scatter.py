@@ -44,9 +44,9 @@ def scatter_chart(sections: Sequence[dict[str, Any]], folder: Path) -> dict[str,
     counted = Counter(row["status"] for row in rows)
     told = ", ".join(f"{number} {status}" for status, number in counted.items())
     caption = (
-        f"Each point is a cell ({told}), and links to its row. Filled: predicted; hollow: fitted, partly fitted or "
-        "reproduced; crosses: stand-in, of another model than the paper's. On the line both are the same; dotted: "
-        f"{CLOSE:.0%} off; at the frame: further off than it is wide."
+        f"Each point is a cell in its own unit ({told}), and links to its row. Filled: predicted; hollow: fitted, "
+        "partly fitted or reproduced; crosses: stand-in, of another model than the paper's. On the line both are the "
+        f"same; dotted: {CLOSE:.0%} off; at the frame: further off than it is wide."
     )
     alt_text = f"Scatter plot, both axes logarithmic: the value of tilestamp against the published one, {told} cells."
     return finished(drawn, folder, name="scoreboard", caption=caption, alt_text=alt_text, height=HEIGHT)

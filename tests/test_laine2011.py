@@ -243,3 +243,15 @@ def test_setup_data_is_within_its_aim_where_the_triangles_are_published():
 
 def test_the_slope_is_that_of_a_line():
     assert figure6.slope(np.array([1, 2, 4]), np.array([3.0, 5.0, 9.0])) == pytest.approx(2.0)
+
+
+def test_answers_beside_what_is_published_are_computed_from_the_cells():
+    ratios = [
+        Cell("a", column, "", published=theirs, ours=ours)
+        for column, theirs, ours in (("SW:HW", 2.0, 2.5), ("SW:HW", 3.0, 2.25), ("FP:SW", 5.0, 4.0))
+    ]
+    assert slides._answer(ratios).startswith("CudaRaster takes 2.25 to 2.5 times (2 to 3 published) the hardware's")
+    sizes = [Cell(scene, "tile queues", "MB", published=2.0, ours=ours) for scene, ours in (("a", 1.5), ("b", 3.0))]
+    assert memory._answer(sizes) == "By scene, tile queues 1.5 to 3 MB (2 to 2 published)."
+    times = [Cell("a", f"{n} samples", "ms", published=2.0 * n, ours=1.0 + n) for n in (1, 8)]
+    assert table2._answer(times) == "8 samples take 4.50 times as long (8.00 published) for a."

@@ -58,7 +58,7 @@ def test_without_cupy_one_sentence_says_what_to_install(command, capsys, monkeyp
 
 def test_a_file_that_is_no_toml_is_refused_before_anything_runs(capsys):
     assert run_command(["measure-machine", "-o", "mine.txt"]) == 2
-    assert "is written as .toml" in capsys.readouterr().err
+    assert "should end in .toml" in capsys.readouterr().err
 
 
 def test_a_block_follows_the_one_before_it_on_its_own_sm():

@@ -88,9 +88,9 @@ def test_an_interrupt_is_one_line(monkeypatch, capsys):
     ("arguments", "says"),
     [
         (["study", "tiles.toml", "-o", "taken.csv"], "taken.csv: is a folder"),
-        (["study", "tiles.toml", "-o", "a.txt"], "is written as .csv or .parquet"),
+        (["study", "tiles.toml", "-o", "a.txt"], "should end in .csv or .parquet"),
         (["validate", "-o", "nowhere/a.csv"], "there is no folder nowhere"),
-        (["measure-machine", "-o", "a.txt"], "is written as .toml"),
+        (["measure-machine", "-o", "a.txt"], "should end in .toml"),
         (["reproduce", "laine2011/memory", "-o", "taken.csv/file"], "cannot be made (File exists)"),
     ],
 )

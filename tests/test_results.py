@@ -166,6 +166,11 @@ def test_an_experiment_is_found_by_paper_and_by_table():
     name = experiment_names()[0]
     assert name in select((name.split("/")[0],))
     assert name in select((name.split("/")[1],))
+    assert select((name,)) == [name]
+
+
+def test_the_beginning_of_a_paper_is_all_of_it_beside_a_table_of_that_name():
+    assert {"ste/eisenacher", "eisenacher2010/table3"} <= set(select(("eisenacher",)))
 
 
 def test_nothing_named_is_what_is_quick():

@@ -44,7 +44,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("list options micropolygon --machine gtx280", "what each option takes, and what this machine can launch"),
         ("list maps tiled", "heat maps that render --map draws"),
         ("list numbers h200", "each number of a machine, its provenance and source"),
-        ("list views killeroo", "cameras of a scene by name"),
+        ("list views teapot", "cameras of a scene by name"),
     ),
 }
 

@@ -21,7 +21,7 @@ def check_png(output: Path | None, flag: str = "-o") -> None:
 def check_file(output: Path, flag: str, *endings: str) -> None:
     """Refuse a file that could not be written."""
     if not output.name.lower().endswith(endings):
-        raise TilestampError(f"{flag} {output}: is written as {' or '.join(endings)}")
+        raise TilestampError(f"{flag} {output}: should end in {' or '.join(endings)}")
     if not is_folder(output.parent):
         raise TilestampError(f"{flag} {output}: there is no folder {output.parent}")
     if is_folder(output):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def print_why(run: Run, found: Sensitivity) -> None:
     """Print a sentence a stage, then times with one thing free, elasticities, and steps of whole numbers."""
-    print_lines("")
+    print_lines("", "What holds a stage would take most off it if it were free; bound, above, is its largest term.")
     print_entries(sentences(found))
     _print_free(found)
     _print_elasticities(found)

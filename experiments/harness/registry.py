@@ -69,7 +69,7 @@ def is_slow(name: str) -> bool:
 
 
 def select(names: tuple[str, ...], *, everything: bool = False) -> list[str]:
-    """Experiments for what a user names: ``paper/table``, a paper, or a table; the quick ones if nothing is named.
+    """Experiments for what a user names: ``paper/table``, how a paper begins, a table; quick ones if none.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ def select(names: tuple[str, ...], *, everything: bool = False) -> list[str]:
     known = experiment_names()
     chosen: list[str] = []
     for name in names:
-        fits = [k for k in known if name in (k, *k.split("/"))] or [k for k in known if k.startswith(name)]
+        alike = [k for k in known if name in k.split("/") or k.startswith(name)]
+        fits = [name] if name in known else alike
         if not fits:
             near = did_you_mean(name, known)
             raise TilestampError(f"no experiment is called {name}{near}; tilestamp list experiments names all")

@@ -50,6 +50,7 @@ def run(progress: Progress) -> Result:
         title="Slides: memory in use, CudaRaster, 1024x768",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[CellFigure("memory", _draw)],
         notes=[
             (
@@ -59,6 +60,18 @@ def run(progress: Progress) -> Result:
         ],
         warnings=[warning()],
     )
+
+
+def _answer(cells: Sequence[Cell]) -> str:
+    """From the least to the most of all scenes, beside what is published."""
+    said = []
+    for column in dict.fromkeys(cell.column for cell in cells):
+        some = [cell for cell in cells if cell.column == column]
+        ours, theirs = ([float(getattr(cell, key)) for cell in some] for key in ("ours", "published"))
+        said.append(
+            f"{column} {min(ours):.3g} to {max(ours):.3g} MB ({min(theirs):.3g} to {max(theirs):.3g} published)"
+        )
+    return f"By scene, {', '.join(said)}."
 
 
 def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:

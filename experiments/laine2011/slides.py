@@ -54,6 +54,7 @@ def run(progress: Progress) -> Result:
         title="Slides: hardware (HW), CudaRaster (SW) and FreePipe (FP), depth test and colour, GTX 480",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[
             CellFigure("pipelines", partial(_draw, PIPELINES[:2])),
             CellFigure("freepipe", partial(_draw, PIPELINES[2:])),
@@ -70,6 +71,19 @@ def run(progress: Progress) -> Result:
         warnings=[warning()],
         tables={"times": table},
     )
+
+
+def _answer(cells: "Sequence[Cell]") -> str:
+    """Ratios of times, from the least to the most."""
+    return (
+        f"CudaRaster takes {_span(cells, 'SW:HW')} the hardware's time, FreePipe {_span(cells, 'FP:SW')} CudaRaster's."
+    )
+
+
+def _span(cells: "Sequence[Cell]", column: str) -> str:
+    some = [cell for cell in cells if cell.column == column]
+    ours, theirs = ([float(getattr(cell, key)) for cell in some] for key in ("ours", "published"))
+    return f"{min(ours):.3g} to {max(ours):.3g} times ({min(theirs):.3g} to {max(theirs):.3g} published)"
 
 
 def published_ms(scene: str, width: int, height: int) -> dict[str, float]:

@@ -35,6 +35,7 @@ def run(progress: Progress) -> Result:
         title="Table 2: samples a pixel, CudaRaster, 1024x768, GTX 480",
         source=SOURCE,
         cells=cells,
+        answer=_answer(cells),
         figures=[CellFigure("samples", _draw)],
         notes=[
             (
@@ -46,6 +47,17 @@ def run(progress: Progress) -> Result:
         ],
         warnings=[warning()],
     )
+
+
+def _answer(cells: "Sequence[Cell]") -> str:
+    """What the most samples take over one, by scene and mode."""
+    said = []
+    for row in dict.fromkeys(cell.row for cell in cells if cell.unit == "ms"):
+        times = {cell.column: cell for cell in cells if cell.row == row}
+        one, most = (times[f"{samples} samples"] for samples in (SAMPLES[0], SAMPLES[-1]))
+        ours, theirs = (float(getattr(most, key)) / float(getattr(one, key)) for key in ("ours", "published"))
+        said.append(f"{ours:.2f} times as long ({theirs:.2f} published) for {row}")
+    return f"{SAMPLES[-1]} samples take {'; '.join(said)}."
 
 
 def modes() -> list[str]:
