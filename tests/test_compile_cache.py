@@ -207,12 +207,34 @@ def test_the_order_of_the_fields_of_a_named_tuple_counts(project, monkeypatch):
     assert _kernels_compiled(project, monkeypatch)[0] == 51
 
 
+BROKEN = {
+    "no pickle": b"not an index",
+    "empty": b"",
+    "no such version": b"\x80\xff",
+    "no text": b"\x8c\x01\x8a.",
+    "longer than memory": b"\x8e" + b"\xff" * 7 + b"\x7f.",
+    "a number": b"K\x01.",
+}
+
+
 @compiled
-def test_a_file_of_the_cache_that_cannot_be_read_is_made_anew(project, monkeypatch):
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("content", BROKEN.values(), ids=BROKEN.keys())
+def test_a_file_of_the_cache_that_cannot_be_read_is_made_anew(project, monkeypatch, kind, content):
     _kernels_compiled(project, monkeypatch)
-    for index in compile_cache.cache_folder().glob("*.nbi"):
-        index.write_bytes(b"not an index")
-    assert _kernels_compiled(project, monkeypatch)[0] == 11
+    for file in compile_cache.cache_folder().glob(f"*.{kind}"):
+        file.write_bytes(content)
+    for compiled_now in (["helper.scaled", "stage.stage"], []):
+        assert _kernels_compiled(project, monkeypatch) == (11, compiled_now)
+
+
+@compiled
+def test_a_helper_whose_bitcode_cannot_be_read_is_made_anew(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    (file,) = (path for path in compile_cache.cache_folder().glob("helper.scaled*.nbc"))
+    file.write_bytes(file.read_bytes().replace(b"BC\xc0\xde", b"....", 1))
+    _edit(project / "stage.py", "+ 1", "+ 2")
+    assert _kernels_compiled(project, monkeypatch) == (12, ["helper.scaled", "stage.stage"])
 
 
 def test_bounds_checking_has_a_folder_of_its_own(tmp_path, monkeypatch):
