@@ -163,6 +163,48 @@ def test_counts_are_the_same_where_each_helper_is_compiled_by_itself(tmp_path):
 
 
 @compiled
+@pytest.mark.parametrize("jit", ["njit", "njit(cache=True)"])
+def test_a_helper_of_numbas_own_can_be_called_by_python_too(project, monkeypatch, jit):
+    _edit(project / "helper.py", "from tilestamp.models.kernel import kernel", "from numba import njit")
+    _edit(project / "helper.py", "@kernel", f"@{jit}")
+    for _ in range(2):
+        assert _kernels_compiled(project, monkeypatch)[0] == 11
+        assert importlib.import_module("kernel_project.helper").scaled(5) == 10
+        _edit(project / "stage.py", "def stage(x):", "def stage(x):\n    x += 0")  # compiled again, its helper loaded
+
+
+@compiled
+def test_a_helper_of_numbas_own_that_a_kernels_helper_loads_can_be_called_by_python_too(project, monkeypatch):
+    plain = "from numba import njit\n\n@njit(cache=True)\ndef twice(x):\n    return 2 * x\n"
+    (project / "deepest.py").write_text(plain)
+    _edit(project / "helper.py", "x * deepest.FACTOR", "deepest.twice(x)")
+    for _ in range(2):
+        assert _kernels_compiled(project, monkeypatch)[0] == 11
+        assert importlib.import_module("kernel_project.deepest").twice(5) == 10
+        _edit(project / "helper.py", "return", "x += 0\n    return")
+
+
+@compiled
+def test_a_kernel_returns_no_array_that_is_lent_to_it(project, monkeypatch):
+    _edit(project / "helper.py", "@kernel", "@kernel(lent=True)")
+    _edit(project / "helper.py", "return x * deepest.FACTOR", "return x, deepest.FACTOR")
+    _edit(project / "stage.py", "return stage(x)", "import numpy as np\n    return stage(np.zeros(x))")
+    with pytest.raises(TypeError, match="scaled returns an array, which is lent to it"):
+        _kernels_compiled(project, monkeypatch)
+
+
+@compiled
+def test_a_kernel_that_cannot_be_compiled_is_no_longer_being_compiled(project, monkeypatch):
+    _edit(project / "helper.py", "return x *", "return x.nothing *")
+    with pytest.raises(numba.TypingError):
+        _kernels_compiled(project, monkeypatch)
+    told = []
+    compile_cache.on_compiling(told.append)
+    compile_cache.note_compiled()
+    assert told == [""]
+
+
+@compiled
 def test_what_a_helper_raises_reaches_python_from_the_cache_too(project, monkeypatch):
     checked = "    if x > 4:\n        raise ValueError('too large')\n    return"
     _edit(project / "helper.py", "    return", checked)
