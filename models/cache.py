@@ -1,9 +1,10 @@
 """What a cache holds of the buffers of a frame, launch by launch: by buffer and not by line; written back at the end.
 
 A launch goes through all its buffers at once. What it leaves is shared among them by footprint, where they do not all
-fit; buffers of earlier launches leave first, the oldest before the others. So while a launch runs, what it brings in
-pushes out first what lies there for longer than the buffers that it finds, and then these: of them each byte as likely
-as another, so that the later it is wanted, the less likely it is still there.
+fit; buffers of earlier launches leave first, the oldest before the others, and of the launch's own what it does not
+touch. So while a launch runs, what it brings in pushes out first what lies there for longer than the buffers that it
+finds, and then these: of them each byte as likely as another, so that the later it is wanted, the less likely it is
+still there.
 """
 
 from collections.abc import Mapping
@@ -50,9 +51,9 @@ class Cache:
         """
         self._launches += 1
         found = self._found(footprints)
-        share = min(1.0, self.capacity / max(1.0, sum(footprints.values())))
+        shares = self._shares(footprints)
         back = sum(
-            self._use(name, size, share, found[name], written.get(name, 0.0)) for name, size in footprints.items()
+            self._use(name, size, shares, found[name], written.get(name, 0.0)) for name, size in footprints.items()
         )
         return found, back + self._evict() + self._clean()
 
@@ -68,6 +69,13 @@ class Cache:
             found = {name: size * self._kept(brought, room[name]) if size else 0.0 for name, size in held.items()}
         return found
 
+    def _shares(self, footprints: Mapping[str, float]) -> tuple[float, float]:
+        """Shares that stay of what a launch touches, and of what else is there of the same buffers."""
+        touched = sum(footprints.values())
+        others = sum(max(0.0, self._size(name) - size) for name, size in footprints.items())
+        room = max(0.0, self.capacity - touched)
+        return min(1.0, self.capacity / max(1.0, touched)), min(1.0, room / others) if others else 0.0
+
     def _kept(self, brought: float, room: float) -> float:
         """Share of a buffer that is still there when it is wanted; what comes in takes older ones' room first."""
         beyond = max(0.0, brought - room)
@@ -82,12 +90,13 @@ class Cache:
         launch = self._buffers[name].launch
         return self.capacity - sum(entry.size for entry in self._buffers.values() if entry.launch >= launch)
 
-    def _use(self, name: str, footprint: float, share: float, found: float, written: float) -> float:
+    def _use(self, name: str, footprint: float, shares: tuple[float, float], found: float, written: float) -> float:
         """Leave a buffer's share in the cache; return what was written back of it meanwhile."""
         entry = self._buffers.pop(name, _Resident(0.0, 0.0, 0))
         lost = 1.0 - found / min(entry.size, footprint) if entry.size and footprint else 0.0
         dirty = entry.dirty * (1.0 - lost)
-        size = footprint * share if share < 1.0 else max(entry.size, footprint)
+        share, stays = shares
+        size = footprint * share + max(0.0, entry.size - footprint) * stays
         left = min(size, max(dirty, written * share))
         self._buffers[name] = _Resident(size, left, self._launches)
         return entry.dirty - dirty + max(0.0, max(dirty, written) - left)

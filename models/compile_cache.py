@@ -6,7 +6,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,18 @@ def note_compiled() -> None:
     """Say that the kernel is compiled which was last begun."""
     del _compiling[-1:]
     _tell()
+
+
+@contextlib.contextmanager
+def compiling() -> Iterator[None]:
+    """Forget in the end what was begun and failed."""
+    before = len(_compiling)
+    try:
+        yield
+    finally:
+        if len(_compiling) > before:
+            del _compiling[before:]
+            _tell()
 
 
 def _tell() -> None:

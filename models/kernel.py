@@ -14,6 +14,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
+from tilestamp.models.compile_cache import compiling
 from tilestamp.models.kernel_cache import KernelCache
 from tilestamp.models.kernel_library import for_kernels, gathers, nested, outermost
 
@@ -48,7 +49,8 @@ def kernel(
     error_model : {"python", "numpy"}
         ``"numpy"``: a division by zero gives inf or nan instead of an error.
     lent : bool
-        The arrays that it takes are the caller's, and it makes none: then compiled code counts no references to them.
+        The arrays that it takes are the caller's, and it makes and returns none: then compiled code counts no
+        references to them.
         Counting calls a function twice for each array (of a tuple, too) of each call, more than a small kernel's work.
     inline : bool
         Its code is copied to where it is called: of a kernel that works for less time than its arguments take to pass.
@@ -67,12 +69,17 @@ def kernel(
 class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
     """Compiles a kernel for Python, or, called by another kernel, for kernels alone."""
 
+    compiles_for_kernels = True
+
     def __init__(self, *args: Any, **keywords: Any) -> None:
         super().__init__(*args, **keywords)
         self._cache = KernelCache(self)  # numba has no public way to name a cache
 
     def add_overload(self, cres: Any) -> None:
         """Keep what was compiled, where Python finds it if it may call it."""
+        returned = self.targetctx.data_model_manager[cres.signature.return_type]
+        if not self.targetoptions["_nrt"] and returned.contains_nrt_meminfo():  # it would be freed once too often
+            raise TypeError(f"{self.py_func.__name__} returns an array, which is lent to it")
         if for_kernels(cres.library):
             self.overloads[tuple(cres.signature.args)] = cres
         else:
@@ -80,7 +87,7 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
 
     def compile(self, sig: Any) -> Any:
         """Compile it, or load it."""
-        with global_compiler_lock:
+        with global_compiler_lock, compiling():
             if nested() or not gathers():
                 return super().compile(sig)
             types_given = tuple(normalize_signature(sig)[0])

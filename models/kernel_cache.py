@@ -18,7 +18,10 @@ from tilestamp.models.compile_cache import cache_folder, note_compiled, note_com
 from tilestamp.models.kernel_digest import kernel_digest
 from tilestamp.models.kernel_library import KernelLibrary, environments, for_kernels, gathers, nested, no_address
 
-_UNREADABLE = (OSError, EOFError, AttributeError, ImportError, KeyError, pickle.UnpicklingError)
+_UNREADABLE = (  # of pickle, whatever its bytes happen to say, and of LLVM
+    *(OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, ArithmeticError, LookupError),
+    *(MemoryError, RuntimeError, TypeError, ValueError),
+)
 
 
 class _Locator(_CacheLocator):  # type: ignore[misc]  # numba has no types

@@ -17,6 +17,7 @@ from numba.core.cpu import CPUContext
 from numba.core.environment import lookup_environment
 
 TRIED = ("0.68",)  # versions of Numba whose private parts are known here
+_CALLED_BY_KERNELS = ("numba", __name__.split(".")[0])  # stand-ins for functions, of Numba and of ours
 _outermost: list["_Nesting"] = []  # of the kernel that is being compiled for Python, under Numba's compiler lock
 
 
@@ -107,15 +108,31 @@ def nested() -> bool:
 
 
 class _Nesting(event.Listener):  # type: ignore[misc]
-    """How many functions are being compiled, each for the one before."""
+    """Functions that are being compiled, each for the one before."""
 
-    depth = 0
+    def __init__(self) -> None:
+        self._dispatchers: list[Any] = []
 
-    def on_start(self, _event: Any) -> None:
-        self.depth += 1
+    def on_start(self, event: Any) -> None:
+        self._dispatchers.append(event.data["dispatcher"])
 
     def on_end(self, _event: Any) -> None:
-        self.depth -= 1
+        self._dispatchers.pop()
+
+    @property
+    def depth(self) -> int:
+        return len(self._dispatchers)
+
+    @property
+    def for_python(self) -> bool:
+        """Whether Python may call what is being compiled: the kernel, or what others had Numba compile."""
+        last = self._dispatchers[-1]
+        return self.depth == 1 or not (hasattr(last, "compiles_for_kernels") or _module(last) in _CALLED_BY_KERNELS)
+
+
+def _module(dispatcher: Any) -> str:
+    name: str = dispatcher.py_func.__module__
+    return name.split(".", maxsplit=1)[0]
 
 
 def no_address() -> Any:
@@ -137,13 +154,13 @@ def outermost(codegen: Any) -> Iterator[None]:
     }
 
     def get_executable(context: Any, library: Any, *described: Any) -> Any:
-        if nesting.depth > 1:
+        if not (nesting.depth == 0 or nesting.for_python or library._finalized):  # noqa: SLF001 - it comes from disk
             return no_address()
         library.for_python = True
         return kept["get_executable"](context, library, *described)
 
     def create_cpython_wrapper(context: Any, *described: Any, **options: Any) -> None:
-        if nesting.depth == 1:
+        if nesting.for_python:
             kept["create_cpython_wrapper"](context, *described, **options)
 
     def create_cfunc_wrapper(*_described: Any, **_options: Any) -> None:

@@ -47,6 +47,14 @@ def test_what_a_launch_brings_in_takes_the_room_of_older_buffers_first():
         assert cache.run({"a": 40, "new": more}, {})[0]["a"] == pytest.approx(found, rel=0.05)
 
 
+def test_what_a_launch_leaves_alone_goes_before_what_it_uses():
+    """Of 90 it reads 60 again, and 40 that it writes push out the others: nothing that it wrote."""
+    cache = Cache(100, 100)
+    cache.run({"a": 90}, {})
+    assert cache.run({"a": 60, "b": 40}, {"b": 40})[1] == 0
+    assert cache.run({"b": 40}, {})[0]["b"] == 40
+
+
 def test_more_than_may_be_dirty_is_written_back_the_oldest_first():
     cache = Cache(100, 30)
     assert cache.run({"a": 20}, {"a": 20})[1] == 0

@@ -4,8 +4,6 @@ import importlib
 import os
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import numba
 import pytest
@@ -163,6 +161,48 @@ def test_counts_are_the_same_where_each_helper_is_compiled_by_itself(tmp_path):
 
 
 @compiled
+@pytest.mark.parametrize("jit", ["njit", "njit(cache=True)"])
+def test_a_helper_of_numbas_own_can_be_called_by_python_too(project, monkeypatch, jit):
+    _edit(project / "helper.py", "from tilestamp.models.kernel import kernel", "from numba import njit")
+    _edit(project / "helper.py", "@kernel", f"@{jit}")
+    for _ in range(2):
+        assert _kernels_compiled(project, monkeypatch)[0] == 11
+        assert importlib.import_module("kernel_project.helper").scaled(5) == 10
+        _edit(project / "stage.py", "def stage(x):", "def stage(x):\n    x += 0")  # compiled again, its helper loaded
+
+
+@compiled
+def test_a_helper_of_numbas_own_that_a_kernels_helper_loads_can_be_called_by_python_too(project, monkeypatch):
+    plain = "from numba import njit\n\n@njit(cache=True)\ndef twice(x):\n    return 2 * x\n"
+    (project / "deepest.py").write_text(plain)
+    _edit(project / "helper.py", "x * deepest.FACTOR", "deepest.twice(x)")
+    for _ in range(2):
+        assert _kernels_compiled(project, monkeypatch)[0] == 11
+        assert importlib.import_module("kernel_project.deepest").twice(5) == 10
+        _edit(project / "helper.py", "return", "x += 0\n    return")
+
+
+@compiled
+def test_a_kernel_returns_no_array_that_is_lent_to_it(project, monkeypatch):
+    _edit(project / "helper.py", "@kernel", "@kernel(lent=True)")
+    _edit(project / "helper.py", "return x * deepest.FACTOR", "return x, deepest.FACTOR")
+    _edit(project / "stage.py", "return stage(x)", "import numpy as np\n    return stage(np.zeros(x))")
+    with pytest.raises(TypeError, match="scaled returns an array, which is lent to it"):
+        _kernels_compiled(project, monkeypatch)
+
+
+@compiled
+def test_a_kernel_that_cannot_be_compiled_is_no_longer_being_compiled(project, monkeypatch):
+    _edit(project / "helper.py", "return x *", "return x.nothing *")
+    with pytest.raises(numba.TypingError):
+        _kernels_compiled(project, monkeypatch)
+    told = []
+    compile_cache.on_compiling(told.append)
+    compile_cache.note_compiled()
+    assert told == [""]
+
+
+@compiled
 def test_what_a_helper_raises_reaches_python_from_the_cache_too(project, monkeypatch):
     checked = "    if x > 4:\n        raise ValueError('too large')\n    return"
     _edit(project / "helper.py", "    return", checked)
@@ -207,44 +247,31 @@ def test_the_order_of_the_fields_of_a_named_tuple_counts(project, monkeypatch):
     assert _kernels_compiled(project, monkeypatch)[0] == 51
 
 
+BROKEN = {
+    "no pickle": b"not an index",
+    "empty": b"",
+    "no such version": b"\x80\xff",
+    "no text": b"\x8c\x01\x8a.",
+    "longer than memory": b"\x8e" + b"\xff" * 7 + b"\x7f.",
+    "a number": b"K\x01.",
+}
+
+
 @compiled
-def test_a_file_of_the_cache_that_cannot_be_read_is_made_anew(project, monkeypatch):
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("content", BROKEN.values(), ids=BROKEN.keys())
+def test_a_file_of_the_cache_that_cannot_be_read_is_made_anew(project, monkeypatch, kind, content):
     _kernels_compiled(project, monkeypatch)
-    for index in compile_cache.cache_folder().glob("*.nbi"):
-        index.write_bytes(b"not an index")
-    assert _kernels_compiled(project, monkeypatch)[0] == 11
+    for file in compile_cache.cache_folder().glob(f"*.{kind}"):
+        file.write_bytes(content)
+    for compiled_now in (["helper.scaled", "stage.stage"], []):
+        assert _kernels_compiled(project, monkeypatch) == (11, compiled_now)
 
 
-def test_bounds_checking_has_a_folder_of_its_own(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
-    plain = compile_cache.cache_folder()
-    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
-    assert compile_cache.cache_folder() != plain
-
-
-def test_a_folder_named_by_the_user_is_used(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert compile_cache.cache_folder().parent == tmp_path
-
-
-def test_a_cache_that_cannot_be_written_falls_back_to_temporary_files(tmp_path, monkeypatch):
-    blocked = tmp_path / "file"
-    blocked.write_text("not a folder")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
-    folder = compile_cache.cache_folder()
-    assert folder.is_dir()
-    assert blocked not in folder.parents
-
-
-def test_kernels_that_were_not_loaded_for_long_are_removed(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "first"))
-    folder = tmp_path / "second" / compile_cache.cache_folder().name
-    folder.mkdir(parents=True)
-    for name in ("old.nbi", "old.1.nbc", "recent.nbi", "recent.1.nbc"):
-        (folder / name).touch()
-    past = time.time() - 2 * compile_cache.STALE_DAYS * 86400
-    os.utime(folder / "old.nbi", (past, past))
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "second"))
-    compile_cache.cache_folder()
-    assert {path.name for path in Path(folder).glob("*.nb*")} == {"recent.nbi", "recent.1.nbc"}
+@compiled
+def test_a_helper_whose_bitcode_cannot_be_read_is_made_anew(project, monkeypatch):
+    _kernels_compiled(project, monkeypatch)
+    (file,) = (path for path in compile_cache.cache_folder().glob("helper.scaled*.nbc"))
+    file.write_bytes(file.read_bytes().replace(b"BC\xc0\xde", b"....", 1))
+    _edit(project / "stage.py", "+ 1", "+ 2")
+    assert _kernels_compiled(project, monkeypatch) == (12, ["helper.scaled", "stage.stage"])
