@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.reports.style import PALETTE, PUBLISHED, figure, legend_beside
 
@@ -99,8 +100,14 @@ def stacked_bars(
 
 
 def _stack(
-    axes: "Axes", table: "pd.DataFrame", places: Any, height: float, colors: dict[str, str], *, filled: bool
-) -> Any:
+    axes: "Axes",
+    table: "pd.DataFrame",
+    places: NDArray[np.float64],
+    height: float,
+    colors: dict[str, str],
+    *,
+    filled: bool,
+) -> NDArray[np.float64]:
     """Draw the segments of bars; give their ends."""
     left = np.zeros(len(table))
     for column in table.columns:

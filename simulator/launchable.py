@@ -13,6 +13,7 @@ from tilestamp.simulator.options import Options, choices, plain
 from tilestamp.simulator.pipelines import pipeline_options
 
 MANY = 6  # values that a sentence names one by one
+MOST = 256  # values of an option that are tried one by one
 PROPOSED = 3  # machines that a sentence names
 FIRST = ("gtx280", "gtx480", "h200")  # machines that are proposed before others: of the papers, and measured
 
@@ -58,10 +59,15 @@ def _check(pipeline: str, options: Options, machine: Machine) -> None:
 
 
 def launchable_values(pipeline: str, options: Options, machine: Machine) -> dict[str, list[Any]]:
-    """Values of each option that a machine can launch, the others as they are; of options of which it cannot all."""
+    """Values of each option that a machine can launch, the others as they are; of options of which it cannot all.
+
+    Options of more than ``MOST`` values are capacities of buffers: no launch's shape depends on them.
+    """
     given, found = plain(options), {}
     for field in msgspec.structs.fields(options):
         values = choices(field.type)
+        if len(values) > MOST:
+            continue
         can = [value for value in values if _can_launch(pipeline, given | {field.name: value}, machine)]
         if len(can) < len(values):
             found[field.name] = can

@@ -65,7 +65,7 @@ def stage_texts(run: Run) -> dict[str, list[str]]:
     return {name: cells for name, cells in texts.items() if any(cells)}
 
 
-def _text(value: Any, name: str, kinds: dict[str, str]) -> str:
+def _text(value: float | str, name: str, kinds: dict[str, str]) -> str:
     """One cell; nothing where a stage has no such number."""
     if value != value:  # noqa: PLR0124 - not-a-number
         return ""
