@@ -103,13 +103,17 @@ def run_command(arguments: list[str]) -> int:
 def _run(arguments: list[str]) -> int:
     """Run one command; bad input is one sentence."""
     from cyclopts import CycloptsError
+    from cyclopts.exceptions import UnusedCliTokensError
 
     from tilestamp.models.errors import TilestampError
 
     try:
         code = _app(arguments)(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except (TilestampError, CycloptsError) as error:
-        sys.stderr.write(f"tilestamp: {' '.join(str(error).split())}{_try(arguments, error)}\n")
+        said = " ".join(str(error).split())
+        if isinstance(error, UnusedCliTokensError):
+            said = f"{shlex.join(error.unused_tokens or [])}: more than this command takes (--help)"
+        sys.stderr.write(f"tilestamp: {said}{_try(arguments, error)}\n")
         return BAD_INPUT
     return code if isinstance(code, int) else 0
 
@@ -127,9 +131,16 @@ def _try(arguments: list[str], error: Exception) -> str:
     return f"; try: {shlex.join(['tilestamp', *kept, *(f'--{name}={value}' for name, value in instead.items())])}"
 
 
+def _default(value: object) -> str | None:
+    """A default as one would type it; nothing where it is nothing."""
+    if isinstance(value, tuple):
+        return " ".join(map(str, value)) or None
+    return None if value in (None, "", False) else str(value)
+
+
 def _app(arguments: list[str]) -> "App":
     """Put the commands together, loaded when used; ``render`` has the flags of the pipeline that is named."""
-    from cyclopts import App
+    from cyclopts import App, Parameter
 
     from tilestamp.experiments.commands.examples import epilogue
 
@@ -140,6 +151,7 @@ def _app(arguments: list[str]) -> "App":
         help=HELP,
         help_format="markdown",
         suppress_keyboard_interrupt=False,
+        default_parameter=Parameter(show_default=_default),
     )
     used = arguments[:1]
     if not used or used[0].startswith("-"):

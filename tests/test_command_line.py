@@ -89,6 +89,7 @@ def test_list_says_what_each_thing_is(kind, capsys):
         (["reproduce", "no-such-table"], "no-such-table"),
         (["reproduce", "laine2011/memory", "-o", "/dev/null/results"], "/dev/null/results"),
         (["list", "planets"], "planets"),
+        (["list", "machines", "h200", "h100"], "h100: more than"),
         (["paint"], "paint"),
     ],
 )
@@ -156,3 +157,11 @@ def test_what_was_lost_or_left_to_chance_is_a_line_of_its_own(options, sentence,
 def test_a_clean_frame_has_nothing_to_remark(capsys):
     assert run_command(["render", "teapot", *SMALL, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["warnings"] == []
+
+
+def test_help_shows_defaults_as_they_are_typed_and_none_that_is_nothing(capsys):
+    assert run_command(["compare", "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "[default: 1024x768]" in shown
+    assert "[default: ()]" not in shown
+    assert "[default: False]" not in shown

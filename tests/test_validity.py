@@ -198,7 +198,7 @@ def reproduce(folder, *arguments):
 def test_a_valid_result_is_shown_and_not_run_again(tmp_path, runs, capsys):
     assert reproduce(tmp_path, "table1") == reproduce(tmp_path, "table1") == 0
     assert runs == [NAME]
-    assert capsys.readouterr().out.count(f"{NAME} [eisenacher2010-table1]") == 2
+    assert capsys.readouterr().out.count(f"{NAME} [eisenacher2010/table1]") == 2
 
 
 def test_again_runs_it_again(tmp_path, runs):

@@ -75,6 +75,7 @@ def reproduce(
             if outcome.result is not None:
                 with say.paused():
                     printed(outcome.result)
+        say("writing the page")
         rows, advice, page = rebuild(output)
     if json_:
         write_json(_as_json(output, chosen))
@@ -121,7 +122,7 @@ def _print_result(result: Result) -> None:
     """Print one result as a table, with its warnings above and its notes below."""
     asked = f"{question(result.experiment)} {answered(result)}".strip()
     print_lines("", *(f"! {warning}" for warning in result.warnings), asked)
-    title = f"{result.title} [{result.name}]"
+    title = f"{result.title} [{result.experiment or result.name}]"
     if result.cells:
         texts = [cell_texts(cell)[:PRINTED] for cell in result.cells]
         shown = [index for index, column in enumerate(zip(*texts, strict=True)) if index < KEYS or any(column)]
