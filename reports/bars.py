@@ -102,7 +102,7 @@ def stacked_bars(
 def _stack(
     axes: "Axes",
     table: "pd.DataFrame",
-    places: NDArray[np.float64],
+    places: NDArray[np.floating],
     height: float,
     colors: dict[str, str],
     *,

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from tilestamp.experiments.commands.tables import print_lines, print_table
 from tilestamp.models.errors import TilestampError
