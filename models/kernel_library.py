@@ -38,11 +38,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
     def serialize(self) -> tuple[str, str, bytes]:
         """Its bitcode, with all that it calls."""
         whole = self._own_module().clone()
-        own = set(_defined(whole))
         self._link_into(whole)
-        for name in _defined(whole):
-            if name not in own:  # names are unique in this process alone
-                whole.get_function(name).linkage = "internal"
         return self.name, "bitcode", whole.as_bitcode()
 
     def add_linking_library(self, library: Any) -> None:
@@ -63,7 +59,8 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
             self._codegen.set_env(environment.env_name, environment)
 
     def _link_into(self, module: Any) -> None:
-        """Add what is reached, each function once."""
+        """Add what is reached, each function once, and hide it: names are unique in one process alone."""
+        own = set(_defined(module))
         seen, left = {id(self)}, list(self._linking_libraries)
         while left:
             library = left.pop(0)
@@ -76,6 +73,9 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
                 module.link_in(library._own_module(), preserve=True)  # noqa: SLF001
             else:
                 module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001
+        for name in _defined(module):
+            if name not in own:
+                module.get_function(name).linkage = "internal"
 
     def _own_module(self) -> Any:
         """Its code as others may link it, several times."""

@@ -144,7 +144,7 @@ def _launch_traffic(requested: tuple[Stream, ...], caches: Caches, cache: Cache,
     written = _footprints((stream for stream in streams if stream.op != "load"), caches.fetch_bytes)
     working_set = sum(footprints.values())
     found, dram = cache.run(footprints, written)
-    with_gaps = sum(written[stream.buffer] for stream in streams if stream.gaps)
+    with_gaps = sum(_footprints((stream for stream in streams if stream.gaps), caches.fetch_bytes).values())
     filled = gaps.run(working_set - sum(found.values()), with_gaps)
     dram += filled * caches.fetch_bytes
     loaded = missed = 0.0

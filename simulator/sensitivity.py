@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 
 NEAR = 0.02  # relative change on both sides of a number for a derivative
 FAR = 0.10  # relative change for what a user would notice; whole numbers by at least 1
-UNITS = ("unit", "unit_bytes", "granularity", "line_bytes")  # ends of names of what hardware has in powers of 2
+UNITS = (
+    "unit",
+    "unit_bytes",
+    "granularity",
+    "line_bytes",
+    "fetch_bytes",
+)  # ends of names of what hardware has in powers of 2
 FRAME = "frame"  # the row of all stages together
 Times = dict[str, float]
 

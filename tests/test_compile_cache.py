@@ -203,6 +203,17 @@ def test_a_kernel_that_cannot_be_compiled_is_no_longer_being_compiled(project, m
 
 
 @compiled
+def test_what_a_kernel_has_gathered_is_hidden_from_kernels_of_other_processes(project, monkeypatch):
+    """Their names are unique in one process alone: a kernel from disk called another's helper of the same name."""
+    _edit(project / "helper.py", "return x * deepest.FACTOR", "return 0 if x < 1 else scaled(x - 1) + deepest.FACTOR")
+    _kernels_compiled(project, monkeypatch)
+    (kept,) = importlib.import_module("kernel_project.stage").stage.overloads.values()
+    functions = kept.library._get_module_for_linking().functions
+    linkages = {function.linkage.name for function in functions if "scaled" in function.name}
+    assert linkages == {"internal"}
+
+
+@compiled
 def test_what_a_helper_raises_reaches_python_from_the_cache_too(project, monkeypatch):
     checked = "    if x > 4:\n        raise ValueError('too large')\n    return"
     _edit(project / "helper.py", "    return", checked)

@@ -54,6 +54,12 @@ def test_the_next_frame_stores_over_what_is_left():
     assert [lines.run(0, 640) for _ in range(3)] == [0, 0, 0]
 
 
+def test_lines_of_a_buffer_that_two_streams_store_with_gaps_are_filled_once():
+    gaps = Stream("a", "store", 40 * MB, 40 * MB, partial_lines=0, gaps=True)
+    one, two = (traffic([launch(*streams)], H200)[0].gap_lines for streams in ([gaps], [gaps, gaps]))
+    assert one == two > 0
+
+
 def test_whole_lines_cost_nothing_more():
     moved = traffic([store("a", 30 * MB), store("b", 40 * MB)], H200)
     assert [each.gap_lines for each in moved] == [0, 0]

@@ -49,9 +49,10 @@ def test_a_whole_number_steps_and_has_no_elasticity(run, found, key, step):
         assert row["more"] == pytest.approx(after[stage] / rows_now(found)[stage])
 
 
-def test_a_unit_of_allocation_is_halved_and_doubled(run, found):
-    row = rows_of(found, "sm.register_unit").loc[FRAME]
-    assert [row["lower"], row["higher"]] == [run.machine.sm.register_unit // 2, run.machine.sm.register_unit * 2]
+@pytest.mark.parametrize("key", ["sm.register_unit", "memory.dram_fetch_bytes"])
+def test_what_hardware_has_in_powers_of_two_is_halved_and_doubled(run, found, key):
+    row, value = rows_of(found, key).loc[FRAME], run.machine.number(key)
+    assert [row["lower"], row["higher"]] == [value // 2, value * 2]
 
 
 def rows_now(found):
