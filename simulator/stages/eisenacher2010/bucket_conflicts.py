@@ -58,7 +58,7 @@ def scratch(lanes: int) -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
     """Copy only the first lane of each tile: it adds for the others (warp aggregation)."""
     for lane in range(lanes):
@@ -69,7 +69,7 @@ def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
                 break
 
 
-@kernel
+@kernel(lent=True)
 def _find(values: Any, found: int, value: int, guess: int) -> int:
     """Index of ``value``, or ``found``; a good guess saves the search."""
     if guess < found and values[guess] == value:
@@ -80,7 +80,7 @@ def _find(values: Any, found: int, value: int, guess: int) -> int:
     return k
 
 
-@kernel
+@kernel(lent=True)
 def list_wanted(tile: Any, start: int, stop: int, padding: int, wanted: Wanted) -> tuple[int, int, int, int]:
     """List what the lanes start..stop-1 want.
 
@@ -115,7 +115,7 @@ def list_wanted(tile: Any, start: int, stop: int, padding: int, wanted: Wanted) 
     return tiles, chunks, depth, chunk_depth
 
 
-@kernel
+@kernel(lent=True)
 def send_requests(wanted: Wanted, chunks: int, merge: int, table: Any) -> int:
     """Count the requests that leave the SM, every lane or what a merged chunk needs; add them to ``table`` by chunk."""
     total = 0

@@ -73,7 +73,7 @@ class BucketCountEvent(IntEnum):
 _E = BucketCountEvent
 
 
-@kernel
+@kernel(lent=True)
 def _place(slots: Any, count: Any, idx: Any) -> None:
     """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
     patches = idx.shape[0]
@@ -88,7 +88,7 @@ def _place(slots: Any, count: Any, idx: Any) -> None:
                     count[tile] += 1
 
 
-@kernel
+@kernel(lent=True)
 def _count_atomic(
     tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, wanted: Any, row: Any, chunk_requests: Any, leaders: Any
 ) -> None:
@@ -120,7 +120,7 @@ def _count_atomic(
     row[_E.ATOMIC_SECTORS] += chunks
 
 
-@kernel
+@kernel(lent=True)
 def active_lanes(tile: Any, lanes: int) -> int:
     """Lanes whose slot holds a tile."""
     active = 0
@@ -129,7 +129,7 @@ def active_lanes(tile: Any, lanes: int) -> int:
     return active
 
 
-@kernel
+@kernel(lent=True)
 def patch_traffic(
     first: int, lanes: int, patches: int, slots: int, coalescing: Any, addresses: Any
 ) -> tuple[int, int, int, int]:

@@ -54,7 +54,7 @@ SMALLEST_WARP = 16  # lanes: 16 load a grid together
 _E = TileRasterEvent
 
 
-@kernel
+@kernel(lent=True)
 def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile

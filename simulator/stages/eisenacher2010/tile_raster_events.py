@@ -128,7 +128,7 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
 
 
-@kernel
+@kernel(lent=True)
 def box_warps(span: Any, shape: BlockShape) -> Any:
     """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
     mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
@@ -138,7 +138,7 @@ def box_warps(span: Any, shape: BlockShape) -> Any:
     return (last_row - first_row + 1) * (((span[1] & mask) >> bits) - ((span[0] & mask) >> bits) + 1)
 
 
-@kernel
+@kernel(lent=True)
 def count_block(
     block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
 ) -> None:
@@ -182,7 +182,7 @@ def count_block(
         row[_E.BARRIERS] += 2 * shape.warps
 
 
-@kernel
+@kernel(lent=True)
 def _count_loads(
     block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
 ) -> None:
@@ -214,7 +214,7 @@ def _count_loads(
     row[_E.LOAD_BYTES] += grids * traffic.grid_bytes
 
 
-@kernel
+@kernel(lent=True)
 def count_stores(x0: int, y0: int, width: int, height: int, shape: BlockShape, addresses: Any, row: Any) -> None:
     """Colour of each pixel on the screen, and depth where there is one sample a pixel."""
     threads = shape.tile * shape.tile

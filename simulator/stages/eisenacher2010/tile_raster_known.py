@@ -35,7 +35,7 @@ LISTED = (  # events that follow from the lists
 )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def _add_grids(
     part: int, parts: int, vertices: Any, count: Any, start: Any, lists: Any, tiles: Tiles, known: Any
 ) -> None:
