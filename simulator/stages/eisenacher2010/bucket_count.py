@@ -103,20 +103,14 @@ def _count_atomic(
         keep_leaders(tile, lanes, leaders)
         tile = leaders
         active = active_lanes(tile, lanes)
-    group_depth = lock_depth = 0
-    if rule.group < rule.warp:
-        for start in range(0, lanes, rule.group):
-            _, _, most, chunk_most = list_wanted(tile, start, min(start + rule.group, lanes), rule.padding, wanted)
-            group_depth += most
-            lock_depth += chunk_most
-    counters, chunks, depth, chunk_depth = list_wanted(tile, 0, lanes, rule.padding, wanted)
+    counters, chunks, depth, group_depth, lock_depth = list_wanted(tile, lanes, rule.group, rule.padding, wanted)
     row[_E.ATOMIC] += 1
     row[_E.ATOMIC_LANES] += active
     row[_E.ATOMIC_REQUESTS] += send_requests(wanted, chunks, rule.merge, chunk_requests)
     row[_E.ATOMIC_CONFLICTS] += active - counters
     row[_E.ATOMIC_DEPTH] += depth
-    row[_E.GROUP_DEPTH] += group_depth if rule.group < rule.warp else depth
-    row[_E.LOCK_DEPTH] += lock_depth if rule.group < rule.warp else chunk_depth
+    row[_E.GROUP_DEPTH] += group_depth
+    row[_E.LOCK_DEPTH] += lock_depth
     row[_E.ATOMIC_SECTORS] += chunks
 
 
