@@ -65,7 +65,7 @@ def test_short_lists_count_as_the_rules_of_the_machine(merge):
     wanted, chunks = scratch(32), np.zeros(8, np.int64)
     for _ in range(200):
         tile = random.integers(-3, 40, 32)
-        counters, sectors, depth, _ = list_wanted(tile, 0, 32, 1, wanted)
+        counters, sectors, depth, _, _ = list_wanted(tile, 32, 32, 1, wanted)
         requests = send_requests(wanted, sectors, merge, chunks)
         active = int((tile >= 0).sum())
         addresses = np.where(tile >= 0, 4 * tile, -1)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from tests.test_counts_of_warps import nonzero
-from tests.test_tile_raster import H200, drawn, some_grids
+from tests.test_tile_raster import GT200, H200, HEIGHT, WIDTH, drawn, some_grids
+from tilestamp.models.coalescing import transactions
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
+from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import tile_raster
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 
 COVERAGE = {"BOX_WARPS", "BOX_LANES", "HIT_WARPS", "HIT_LANES", "Z_WARPS", "Z_LANES", "SUBTILE_PASS", "SAMPLE_TESTS"}
@@ -109,3 +112,15 @@ def test_dicing_five_sub_patches_of_three_patches(textured):
     expected |= bytes_of(expected)
     assert nonzero(work.counts()) == nonzero(expected)
     assert set(work.counts()) == {event.name for event in DiceEvent}
+
+
+@pytest.mark.parametrize("simt", [GT200, H200])
+def test_each_tile_stores_its_pixels_on_the_screen_wherever_it_begins(simt):
+    tiles, nothing = screen_tiles(WIDTH, HEIGHT, 8, 4), np.zeros(0, np.uint32)
+    lists = np.zeros(tiles.total, np.uint32), np.zeros(tiles.total, np.uint32), nothing
+    table = tile_raster(np.zeros((0, 16, 4), np.float32), *lists, tiles, WIDTH, HEIGHT, simt)[1][0].table
+    for block, row in enumerate(table):
+        x, y = np.arange(64) % 8 + block % tiles.columns * 8, np.arange(64) // 8 + block // tiles.columns * 8
+        addresses = np.where((x < WIDTH) & (y < HEIGHT), 4 * (y * WIDTH + x), -1)
+        warps = [transactions(warp, 32, 4, int(simt.coalescing)) for warp in addresses.reshape(2, 32)]
+        assert [row[E.STORE_TRANSACTIONS], row[E.STORE_BYTES]] == [2 * sum(each) for each in zip(*warps, strict=True)]

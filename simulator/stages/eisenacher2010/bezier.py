@@ -2,6 +2,7 @@
 
 Sixteen sub-patches are worked on side by side: each innermost loop runs over ``LANES`` of them, and LLVM makes vectors
 of it. For that, arrays are flat, their axes given in the comments: constant distances show that they do not overlap;
+a coordinate of a net is a view, so that no index in a loop could be below zero, which would mean one from the end;
 and their lengths are not known to the compiler, which would unroll short loops instead. Each lane does the same float32
 operations in the same order as one alone would.
 """
@@ -38,7 +39,7 @@ def new_squares(lanes: Any) -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def set_square(squares: Squares, lane: Any, queue: Any, n: Any) -> None:
     """Put sub-patch ``n`` of the queue in a lane."""
     squares.patch[lane] = queue.patch[n]
@@ -46,7 +47,7 @@ def set_square(squares: Squares, lane: Any, queue: Any, n: Any) -> None:
     squares.side[lane] = ONE / np.float32(1 << queue.level[n])
 
 
-@kernel
+@kernel(lent=True)
 def gather(points: Any, patch: Any, net: Any) -> None:
     """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
     for lane in range(LANES):
@@ -56,7 +57,7 @@ def gather(points: Any, patch: Any, net: Any) -> None:
                 net[(POINTS * d + k) * LANES + lane] = points[p, d, k]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def restriction(first: Any, side: Any, rows: Any) -> None:
     """Tables of the intervals [a, b] = [first * side, (first + 1) * side] by blossoms.
 
@@ -73,12 +74,12 @@ def restriction(first: Any, side: Any, rows: Any) -> None:
         rows[3 * LANES + n], rows[7 * LANES + n], rows[11 * LANES + n], rows[15 * LANES + n] = _bernstein(b, B)
 
 
-@kernel
+@kernel(lent=True)
 def _bernstein(a: Any, A: Any) -> Any:
     return A * A * A, THREE * a * A * A, THREE * a * a * A, a * a * a
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def basis(first: Any, side: Any, rows: Any, slopes: Any) -> None:
     """Bernstein polynomials at four evenly spaced parameters of the intervals [first * side, (first + 1) * side].
 
@@ -108,7 +109,7 @@ def basis(first: Any, side: Any, rows: Any, slopes: Any) -> None:
             )
 
 
-@kernel
+@kernel(lent=True)
 def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     return (
         w[(0 + k) * LANES + n] * p0
@@ -118,38 +119,36 @@ def _weigh(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def _weigh_steps(w: Any, k: Any, n: Any, p0: Any, p1: Any, p2: Any, p3: Any) -> Any:
     return w[(0 + k) * LANES + n] * (p1 - p0) + w[(4 + k) * LANES + n] * (p2 - p1) + w[(8 + k) * LANES + n] * (p3 - p2)
 
 
-@kernel
-def _along_v(net: Any, d: Any, by_v: Any, between: Any) -> None:
-    """Contract the rows of coordinate d of a net: ``between[r, x]``."""
+@kernel(lent=True)
+def _along_v(net: Any, by_v: Any, between: Any) -> None:
+    """Contract the rows of a coordinate of a net: ``between[r, x]``."""
     for x in range(4):
         for n in range(between.shape[0] // POINTS):
-            at = (POINTS * d + x) * LANES + n
+            at = x * LANES + n
             p0, p1, p2, p3 = net[at], net[at + 4 * LANES], net[at + 8 * LANES], net[at + 12 * LANES]
             q0, q1 = _weigh(by_v, 0, n, p0, p1, p2, p3), _weigh(by_v, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh(by_v, 2, n, p0, p1, p2, p3), _weigh(by_v, 3, n, p0, p1, p2, p3)
-            at = x * LANES + n
             between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
-@kernel
-def _along_u(between: Any, by_u: Any, out: Any, d: Any) -> None:
-    """Contract the columns: ``out[d, 4 r + c]``."""
+@kernel(lent=True)
+def _along_u(between: Any, by_u: Any, out: Any) -> None:
+    """Contract the columns: ``out[4 r + c]``."""
     for r in range(4):
         for n in range(between.shape[0] // POINTS):
             at = 4 * r * LANES + n
             p0, p1, p2, p3 = between[at], between[at + LANES], between[at + 2 * LANES], between[at + 3 * LANES]
             q0, q1 = _weigh(by_u, 0, n, p0, p1, p2, p3), _weigh(by_u, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh(by_u, 2, n, p0, p1, p2, p3), _weigh(by_u, 3, n, p0, p1, p2, p3)
-            at += POINTS * d * LANES
             out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
-@kernel
+@kernel(lent=True)
 def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> None:
     """Tensor product: control points of sub-patches by ``restriction`` tables, points of grids by ``basis`` tables.
 
@@ -163,12 +162,13 @@ def restrict(net: Any, by_u: Any, by_v: Any, between: Any, out: Any) -> None:
     out : ndarray, (D, 16, LANES), float32
     """
     for d in range(out.shape[0] // (POINTS * LANES)):
-        _along_v(net, d, by_v, between)
-        _along_u(between, by_u, out, d)
+        of_d = slice(POINTS * LANES * d, POINTS * LANES * (d + 1))
+        _along_v(net[of_d], by_v, between)
+        _along_u(between, by_u, out[of_d])
 
 
-@kernel
-def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> None:
+@kernel(lent=True)
+def _slopes_along_u(between: Any, slope_u: Any, out: Any) -> None:
     """Contract the differences of neighbouring columns."""
     for r in range(4):
         for n in range(between.shape[0] // POINTS):
@@ -176,24 +176,22 @@ def _slopes_along_u(between: Any, slope_u: Any, out: Any, d: Any) -> None:
             p0, p1, p2, p3 = between[at], between[at + LANES], between[at + 2 * LANES], between[at + 3 * LANES]
             q0, q1 = _weigh_steps(slope_u, 0, n, p0, p1, p2, p3), _weigh_steps(slope_u, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh_steps(slope_u, 2, n, p0, p1, p2, p3), _weigh_steps(slope_u, 3, n, p0, p1, p2, p3)
-            at += POINTS * d * LANES
             out[at], out[at + LANES], out[at + 2 * LANES], out[at + 3 * LANES] = q0, q1, q2, q3
 
 
-@kernel
-def _slopes_along_v(net: Any, d: Any, slope_v: Any, between: Any) -> None:
+@kernel(lent=True)
+def _slopes_along_v(net: Any, slope_v: Any, between: Any) -> None:
     """Contract the differences of neighbouring rows."""
     for x in range(4):
         for n in range(between.shape[0] // POINTS):
-            at = (POINTS * d + x) * LANES + n
+            at = x * LANES + n
             p0, p1, p2, p3 = net[at], net[at + 4 * LANES], net[at + 8 * LANES], net[at + 12 * LANES]
             q0, q1 = _weigh_steps(slope_v, 0, n, p0, p1, p2, p3), _weigh_steps(slope_v, 1, n, p0, p1, p2, p3)
             q2, q3 = _weigh_steps(slope_v, 2, n, p0, p1, p2, p3), _weigh_steps(slope_v, 3, n, p0, p1, p2, p3)
-            at = x * LANES + n
             between[at], between[at + 4 * LANES], between[at + 8 * LANES], between[at + 12 * LANES] = q0, q1, q2, q3
 
 
-@kernel
+@kernel(lent=True)
 def evaluate(
     net: Any, by_u: Any, by_v: Any, slope_u: Any, slope_v: Any, between: Any, out: Any, along_u: Any, along_v: Any
 ) -> None:
@@ -202,19 +200,22 @@ def evaluate(
     Differences of equal control points are exactly zero: a collapsed edge shows as a zero tangent.
     """
     for d in range(net.shape[0] // (POINTS * LANES)):
-        _along_v(net, d, by_v, between)
-        _along_u(between, by_u, out, d)
-        _slopes_along_u(between, slope_u, along_u, d)
-        _slopes_along_v(net, d, slope_v, between)
-        _along_u(between, by_u, along_v, d)
+        of_d = slice(POINTS * LANES * d, POINTS * LANES * (d + 1))
+        _along_v(net[of_d], by_v, between)
+        _along_u(between, by_u, out[of_d])
+        _slopes_along_u(between, slope_u, along_u[of_d])
+        _slopes_along_v(net[of_d], slope_v, between)
+        _along_u(between, by_u, along_v[of_d])
 
 
-@kernel
-def evaluate_point(net: Any, n: Any, u: Any, v: Any, values: Any) -> None:
-    """Point of lane ``n`` at (u, v), and thirds of its derivatives along u and v: ``values[d]``, as ``evaluate``."""
+@kernel(lent=True)
+def evaluate_point(net: Any, n: Any, u: Any, v: Any, rows: Any, values: Any) -> None:
+    """Point of lane ``n`` at (u, v), and thirds of its derivatives along u and v: ``values[d]``, as ``evaluate``.
+
+    ``rows`` (2, 4) is scratch.
+    """
     U, V = ONE - u, ONE - v
     by_u, by_v = _bernstein(u, U), _bernstein(v, V)
-    rows = np.empty((2, 4), np.float32)
     for d in range(net.shape[0] // (POINTS * LANES)):
         for x in range(4):
             at = (POINTS * d + x) * LANES + n

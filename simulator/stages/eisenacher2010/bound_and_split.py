@@ -57,7 +57,7 @@ class SubPatches(NamedTuple):
     passes: NDArray[np.int64]  # (passes, 5)
 
 
-@kernel
+@kernel(lent=True)
 def _subdivide(
     part: int, parts: int, queue: SubPatches, path: Any, places: Any, target: SubPatches, target_path: Any
 ) -> None:

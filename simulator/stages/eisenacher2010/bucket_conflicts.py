@@ -37,6 +37,7 @@ class Wanted(NamedTuple):
     chunk: NDArray[np.int64]
     chunk_lanes: NDArray[np.int64]
     chunk_depth: NDArray[np.int64]  # lanes at the most wanted counter of the chunk
+    together: NDArray[np.int64]  # (2, lanes) lanes of one group at a counter, and at a chunk
 
 
 def atomic_rule(simt: Simt, padding: int) -> AtomicRule:
@@ -55,10 +56,11 @@ def scratch(lanes: int) -> Any:
         np.empty(lanes, np.int64),
         np.empty(lanes, np.int64),
         np.empty(lanes, np.int64),
+        np.empty((2, lanes), np.int64),
     )
 
 
-@kernel
+@kernel(lent=True)
 def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
     """Copy only the first lane of each tile: it adds for the others (warp aggregation)."""
     for lane in range(lanes):
@@ -69,7 +71,7 @@ def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
                 break
 
 
-@kernel
+@kernel(lent=True)
 def _find(values: Any, found: int, value: int, guess: int) -> int:
     """Index of ``value``, or ``found``; a good guess saves the search."""
     if guess < found and values[guess] == value:
@@ -80,17 +82,24 @@ def _find(values: Any, found: int, value: int, guess: int) -> int:
     return k
 
 
-@kernel
-def list_wanted(tile: Any, start: int, stop: int, padding: int, wanted: Wanted) -> tuple[int, int, int, int]:
-    """List what the lanes start..stop-1 want.
+@kernel(lent=True)
+def list_wanted(tile: Any, lanes: int, group: int, padding: int, wanted: Wanted) -> tuple[int, int, int, int, int]:
+    """List what the lanes of a warp want, of which ``group`` arrive together.
 
     Returns
     -------
-    tiles, chunks, depth, chunk_depth : int
-        Distinct counters and chunks; lanes at the most wanted counter, and in the most wanted chunk.
+    tiles, chunks, depth, group_depth, lock_depth : int
+        Distinct counters and chunks; lanes at the most wanted counter; the same, and lanes in the most wanted chunk,
+        of each group, summed.
     """
-    tiles = chunks = depth = chunk_depth = k = 0
-    for lane in range(start, stop):
+    of_tile, of_chunk = wanted.together
+    tiles = chunks = depth = group_depth = lock_depth = most = chunk_most = k = begins = 0
+    for lane in range(lanes):
+        if lane == begins:  # a group
+            begins += group
+            of_tile[:tiles] = 0
+            of_chunk[:chunks] = 0
+            group_depth, lock_depth, most, chunk_most = group_depth + most, lock_depth + chunk_most, 0, 0
         if tile[lane] < 0:
             continue
         k = _find(wanted.tile, tiles, tile[lane], k)
@@ -100,22 +109,24 @@ def list_wanted(tile: Any, start: int, stop: int, padding: int, wanted: Wanted) 
             if c == chunks:
                 wanted.chunk[c] = chunk
                 wanted.chunk_lanes[c] = 0
-                wanted.chunk_depth[c] = 0
+                wanted.chunk_depth[c] = of_chunk[c] = 0
                 chunks += 1
             wanted.tile[k] = tile[lane]
-            wanted.tile_lanes[k] = 0
+            wanted.tile_lanes[k] = of_tile[k] = 0
             wanted.tile_chunk[k] = c
             tiles += 1
         wanted.tile_lanes[k] += 1
         c = wanted.tile_chunk[k]
         wanted.chunk_lanes[c] += 1
+        of_tile[k] += 1
+        of_chunk[c] += 1
         wanted.chunk_depth[c] = max(wanted.chunk_depth[c], wanted.tile_lanes[k])
         depth = max(depth, wanted.tile_lanes[k])
-        chunk_depth = max(chunk_depth, wanted.chunk_lanes[c])
-    return tiles, chunks, depth, chunk_depth
+        most, chunk_most = max(most, of_tile[k]), max(chunk_most, of_chunk[c])
+    return tiles, chunks, depth, group_depth + most, lock_depth + chunk_most
 
 
-@kernel
+@kernel(lent=True)
 def send_requests(wanted: Wanted, chunks: int, merge: int, table: Any) -> int:
     """Count the requests that leave the SM, every lane or what a merged chunk needs; add them to ``table`` by chunk."""
     total = 0

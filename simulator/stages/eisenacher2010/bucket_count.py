@@ -73,7 +73,7 @@ class BucketCountEvent(IntEnum):
 _E = BucketCountEvent
 
 
-@kernel
+@kernel(lent=True)
 def _place(slots: Any, count: Any, idx: Any) -> None:
     """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
     patches = idx.shape[0]
@@ -88,7 +88,7 @@ def _place(slots: Any, count: Any, idx: Any) -> None:
                     count[tile] += 1
 
 
-@kernel
+@kernel(lent=True)
 def _count_atomic(
     tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, wanted: Any, row: Any, chunk_requests: Any, leaders: Any
 ) -> None:
@@ -103,24 +103,18 @@ def _count_atomic(
         keep_leaders(tile, lanes, leaders)
         tile = leaders
         active = active_lanes(tile, lanes)
-    group_depth = lock_depth = 0
-    if rule.group < rule.warp:
-        for start in range(0, lanes, rule.group):
-            _, _, most, chunk_most = list_wanted(tile, start, min(start + rule.group, lanes), rule.padding, wanted)
-            group_depth += most
-            lock_depth += chunk_most
-    counters, chunks, depth, chunk_depth = list_wanted(tile, 0, lanes, rule.padding, wanted)
+    counters, chunks, depth, group_depth, lock_depth = list_wanted(tile, lanes, rule.group, rule.padding, wanted)
     row[_E.ATOMIC] += 1
     row[_E.ATOMIC_LANES] += active
     row[_E.ATOMIC_REQUESTS] += send_requests(wanted, chunks, rule.merge, chunk_requests)
     row[_E.ATOMIC_CONFLICTS] += active - counters
     row[_E.ATOMIC_DEPTH] += depth
-    row[_E.GROUP_DEPTH] += group_depth if rule.group < rule.warp else depth
-    row[_E.LOCK_DEPTH] += lock_depth if rule.group < rule.warp else chunk_depth
+    row[_E.GROUP_DEPTH] += group_depth
+    row[_E.LOCK_DEPTH] += lock_depth
     row[_E.ATOMIC_SECTORS] += chunks
 
 
-@kernel
+@kernel(lent=True)
 def active_lanes(tile: Any, lanes: int) -> int:
     """Lanes whose slot holds a tile."""
     active = 0
@@ -129,7 +123,7 @@ def active_lanes(tile: Any, lanes: int) -> int:
     return active
 
 
-@kernel
+@kernel(lent=True)
 def patch_traffic(
     first: int, lanes: int, patches: int, slots: int, coalescing: Any, addresses: Any
 ) -> tuple[int, int, int, int]:

@@ -49,7 +49,7 @@ class BucketWriteEvent(IntEnum):
 _E = BucketWriteEvent
 
 
-@kernel
+@kernel(lent=True)
 def _write(boxes: Any, tiles: Tiles, start: Any, idx: Any, lists: Any) -> None:
     """Fill LISTS."""
     for p in range(boxes.shape[0]):
@@ -59,7 +59,7 @@ def _write(boxes: Any, tiles: Tiles, start: Any, idx: Any, lists: Any) -> None:
                 lists[start[y * tiles.columns + x] + idx[p, (y - y0) * tiles.slots + x - x0]] = p
 
 
-@kernel
+@kernel(lent=True)
 def _count_slot(
     tile: Any, first: int, lanes: int, slot: int, start: Any, idx: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:

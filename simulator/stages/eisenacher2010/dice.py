@@ -56,11 +56,13 @@ class Grids(NamedTuple):
     boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the 16 vertices
 
 
-@kernel
-def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int) -> None:
-    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch."""
+@kernel(lent=True)
+def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int, values: Any) -> None:
+    """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch.
+
+    ``values`` (6, 4): a coordinate a row, point and derivatives along u and v; and two rows of scratch.
+    """
     middle = np.float32(0.5)
-    values = np.zeros((4, 3), np.float32)  # a coordinate a row: point, derivatives along u and v
     values[3, 0] = 1
     for n in range(lanes):
         for k in range(VERTICES):
@@ -69,7 +71,7 @@ def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int) -> None:
                 continue
             u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / np.float32(3)
             v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / np.float32(3)
-            evaluate_point(net, n, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE, values)
+            evaluate_point(net, n, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE, values[4:], values)
             ux, uy, uz = tangent(values, 1)
             vx, vy, vz = tangent(values, 2)
             grid.rows[NORMAL + at] = uy * vz - uz * vy
@@ -77,7 +79,7 @@ def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int) -> None:
             grid.rows[NORMAL + 2 * shading.VERTICES + at] = ux * vy - uy * vx
 
 
-@kernel
+@kernel(lent=True)
 def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, colors: Any, boxes: Any) -> None:
     """Write the vertices of each lane, and bound them."""
     screen = grid.screen
@@ -94,7 +96,7 @@ def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, colors: Any,
         boxes[first + n, 0], boxes[first + n, 1], boxes[first + n, 2], boxes[first + n, 3] = x0, y0, x1, y1
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _project(s: Any) -> None:
     """Divide the screen rows of all vertices by w."""
     for k in range(shading.VERTICES):
@@ -123,6 +125,7 @@ def _dice(
     """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
     grid, squares = new_grid(side, width), new_squares(width)
     corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)
+    values = np.zeros((6, 4), np.float32)
     number = boxes.shape[0]
     batches = (number + LANES - 1) // LANES
     for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):
@@ -141,7 +144,7 @@ def _dice(
                 grid.along_v,
             )  # fmt: skip
             if set_normals(grid.rows):
-                _borrow_normals(grid, net, squares, lanes)
+                _borrow_normals(grid, net, squares, lanes, values)
             shade(grid, light, texture, squares)
         _store_grids(grid, first, lanes, vertices, colors, boxes)
 

@@ -70,7 +70,7 @@ def _new_scratch(side: Any, lanes: Any) -> Any:
     )
 
 
-@kernel
+@kernel(lent=True)
 def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any) -> Any:
     """Whether a box satisfies the bound."""
     if whole_pixels:
@@ -78,7 +78,7 @@ def _is_small(x0: Any, y0: Any, x1: Any, y1: Any, bound: Any, whole_pixels: Any)
     return x1 - x0 < bound and y1 - y0 < bound
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _measure(s: _Scratch, width: Any, height: Any, near: Any) -> None:
     """Sides of the frustum and boxes of all lanes; a box means nothing where a point lies behind the eye."""
     net, box = s.net, s.box
@@ -101,7 +101,7 @@ def _measure(s: _Scratch, width: Any, height: Any, near: Any) -> None:
             box[2, n], box[3, n] = max(box[2, n], x), max(box[3, n], y)
 
 
-@kernel
+@kernel(lent=True)
 def _path(s: _Scratch, n: Any, bound: Any, whole_pixels: Any) -> Any:
     """What was found about lane ``n``."""
     if s.everywhere[n] & _OFF_SCREEN:

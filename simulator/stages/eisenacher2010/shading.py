@@ -103,7 +103,7 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
     )
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def set_normals(s: Any) -> Any:
     """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
     missing = 0
@@ -129,7 +129,7 @@ def set_normals(s: Any) -> Any:
     return missing
 
 
-@kernel
+@kernel(lent=True)
 def tangent(values: Any, along: Any) -> Any:
     """Tangent of x/w, y/w, z/w up to a positive factor, from a point and its derivatives, a coordinate a row."""
     w, dw = values[3, 0], values[3, along]
@@ -140,7 +140,7 @@ def tangent(values: Any, along: Any) -> Any:
     )
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> None:
     """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
     tiny = np.float32(1e-30)
@@ -169,7 +169,7 @@ def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew:
         s[GLOSS + k] = SPECULAR * mirrored
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _set_checker(s: Any, squares: Any) -> None:
     """Reflectances of a solid checker."""
     for k in range(VERTICES):
@@ -182,7 +182,7 @@ def _set_checker(s: Any, squares: Any) -> None:
         s[COLOR + 2 * VERTICES + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _set_texels(s: Any, texture: Any, squares: Any) -> None:
     """Reflectances from the texels at (u, v) of the patch, v down the rows."""
     for at in range(VERTICES):
@@ -195,7 +195,7 @@ def _set_texels(s: Any, texture: Any, squares: Any) -> None:
             s[COLOR + VERTICES * channel + at] = np.float32(texture[row, column, channel]) / _BYTE
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _set_colors(s: Any) -> None:
     """Light the reflectances: levels from 0 to 255."""
     for channel in range(3):
@@ -204,7 +204,7 @@ def _set_colors(s: Any) -> None:
             s[COLOR + channel * VERTICES + k] = min(level, _ONE) * _BYTE + _HALF
 
 
-@kernel
+@kernel(lent=True)
 def shade(grid: Grid, light: Lighting, texture: Any, squares: Any) -> None:
     """Set the colours of grids with normals: three rows of levels, to be cut to whole numbers."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
@@ -216,7 +216,7 @@ def shade(grid: Grid, light: Lighting, texture: Any, squares: Any) -> None:
     _set_colors(s)
 
 
-@kernel
+@kernel(lent=True)
 def packed_color(s: Any, k: Any) -> Any:
     """RGBA8 of a shaded vertex, red lowest."""
     red, green, blue = s[COLOR + k], s[COLOR + VERTICES + k], s[COLOR + 2 * VERTICES + k]

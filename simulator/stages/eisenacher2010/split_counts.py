@@ -79,7 +79,7 @@ _S = SubdivideEvent
 _T = TransformEvent
 
 
-@kernel
+@kernel(lent=True)
 def _count_oracle_warp(
     first: Any, lanes: int, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:
@@ -112,7 +112,7 @@ def _count_oracle_warp(
     row[_O.STORE_BYTES] += size
 
 
-@kernel
+@kernel(lent=True)
 def _count_subdivide_warp(
     first: Any, lanes: int, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:

@@ -48,7 +48,7 @@ def screen_tiles(width: int, height: int, tile: int, bound: float) -> Tiles:
     return Tiles(tile, -(-width // tile), -(-height // tile), max(2, math.ceil(bound / tile) + 1))
 
 
-@kernel
+@kernel(lent=True)
 def tile_range(box: Any, tiles: Any) -> tuple[Any, Any, Any, Any]:
     """First and last tile column and row that the box x0, y0, x1, y1 overlaps; last < first where it is off screen."""
     scale = np.float32(1) / np.float32(tiles.size)
@@ -62,7 +62,7 @@ def tile_range(box: Any, tiles: Any) -> tuple[Any, Any, Any, Any]:
     return x0, y0, x1, y1
 
 
-@kernel
+@kernel(lent=True)
 def slot_tiles(boxes: Any, first: int, lanes: int, tiles: Tiles, slots: Any) -> None:
     """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes)."""
     for lane in range(lanes):

@@ -23,6 +23,7 @@ from tilestamp.simulator.stage import divisible
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     EDGE_VECTORS,
+    SEGMENT_WORDS,
     VECTOR_BYTES,
     VERTICES,
     WORD_BYTES,
@@ -54,7 +55,7 @@ SMALLEST_WARP = 16  # lanes: 16 load a grid together
 _E = TileRasterEvent
 
 
-@kernel
+@kernel(lent=True)
 def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
@@ -110,7 +111,7 @@ def _raster_tiles(
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
-    addresses = np.empty(shape.warp, np.int64)
+    addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     height, width = depth.shape
     for i in range(drawn.size * part // parts, drawn.size * (part + 1) // parts):
         block = drawn[i]
@@ -126,7 +127,7 @@ def _raster_tiles(
         resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
         if row is not None:
             count_block(block, lists, first, grids, shape, traffic, row)
-            count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, row)
+            count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, stores, row)
 
 
 class Pixels(NamedTuple):

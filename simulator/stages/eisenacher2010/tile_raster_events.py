@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.banks import bank_passes
-from tilestamp.models.coalescing import contiguous, transactions
+from tilestamp.models.coalescing import SEGMENT_BYTES, contiguous, transactions
 from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing, Simt
@@ -25,6 +25,7 @@ VECTOR_WORDS = 4
 WORD_BYTES = 4
 EDGE_VECTORS = 27  # a grid: 12 floats a quad, where edge equations are loaded
 EDGE_ALIGNMENTS = 8  # ways in which 432 bytes lie in 128-byte segments
+SEGMENT_WORDS = SEGMENT_BYTES // WORD_BYTES  # places in a segment where the pixels of a tile may begin
 BROADCAST_LOADS = 4  # vertices that each lane reads for a quad
 EDGE_LOADS = 3  # vectors that each lane reads for the edges of a quad
 _HALF_WARP = int(Coalescing.HALF_WARP_SEGMENTS)
@@ -128,7 +129,7 @@ def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
 
 
-@kernel
+@kernel(lent=True)
 def box_warps(span: Any, shape: BlockShape) -> Any:
     """Warps that have a lane in the columns and rows of ``span``, which lies in one sub-tile."""
     mask, bits = shape.tile - 1, shape.warp_bits  # tiles and warps are powers of two
@@ -138,7 +139,7 @@ def box_warps(span: Any, shape: BlockShape) -> Any:
     return (last_row - first_row + 1) * (((span[1] & mask) >> bits) - ((span[0] & mask) >> bits) + 1)
 
 
-@kernel
+@kernel(lent=True)
 def count_block(
     block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
 ) -> None:
@@ -182,7 +183,7 @@ def count_block(
         row[_E.BARRIERS] += 2 * shape.warps
 
 
-@kernel
+@kernel(lent=True)
 def _count_loads(
     block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
 ) -> None:
@@ -214,11 +215,29 @@ def _count_loads(
     row[_E.LOAD_BYTES] += grids * traffic.grid_bytes
 
 
-@kernel
-def count_stores(x0: int, y0: int, width: int, height: int, shape: BlockShape, addresses: Any, row: Any) -> None:
-    """Colour of each pixel on the screen, and depth where there is one sample a pixel."""
-    threads = shape.tile * shape.tile
-    buffers = 2 if shape.side == 1 else 1
+@kernel(lent=True)
+def count_stores(
+    x0: int, y0: int, width: int, height: int, shape: BlockShape, addresses: Any, known: Any, row: Any
+) -> None:
+    """Colour of each pixel on the screen, and depth where there is one sample a pixel.
+
+    Whole tiles that begin at the same word of a segment store alike: ``known``, (SEGMENT_WORDS, 2), zeros at first.
+    """
+    buffers, at = 2 if shape.side == 1 else 1, (y0 * width + x0) % SEGMENT_WORDS
+    whole = x0 + shape.tile <= width and y0 + shape.tile <= height
+    count, size = known[at, 0], known[at, 1]
+    if not whole or count == 0:
+        count, size = _stores(x0, y0, width, height, shape, addresses)
+        if whole:
+            known[at, 0], known[at, 1] = count, size
+    row[_E.STORE_TRANSACTIONS] += buffers * count
+    row[_E.STORE_BYTES] += buffers * size
+
+
+@kernel(lent=True)
+def _stores(x0: int, y0: int, width: int, height: int, shape: BlockShape, addresses: Any) -> tuple[int, int]:
+    """Transactions, and their bytes, of a word of each pixel on the screen."""
+    threads, transfers, total = shape.tile * shape.tile, 0, 0
     for first in range(0, threads, shape.warp):
         lanes = min(shape.warp, threads - first)
         for lane in range(lanes):
@@ -226,5 +245,6 @@ def count_stores(x0: int, y0: int, width: int, height: int, shape: BlockShape, a
             x = x0 + (first + lane) % shape.tile
             addresses[lane] = (y * width + x) * WORD_BYTES if x < width and y < height else -1
         count, size = transactions(addresses, lanes, WORD_BYTES, shape.coalescing)
-        row[_E.STORE_TRANSACTIONS] += buffers * count
-        row[_E.STORE_BYTES] += buffers * size
+        transfers += count
+        total += size
+    return transfers, total

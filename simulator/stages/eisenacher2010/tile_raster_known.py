@@ -16,6 +16,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import Known
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
+    SEGMENT_WORDS,
     BlockShape,
     TileRasterEvent,
     block_shape,
@@ -35,7 +36,7 @@ LISTED = (  # events that follow from the lists
 )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def _add_grids(
     part: int, parts: int, vertices: Any, count: Any, start: Any, lists: Any, tiles: Tiles, known: Any
 ) -> None:
@@ -61,11 +62,11 @@ def _count_lists(
     table: Any,
 ) -> None:  # fmt: skip
     """Rows of the tiles of one part, had no grid a quad in its tile."""
-    addresses = np.empty(shape.warp, np.int64)
+    addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     for t in range(count.size * part // parts, count.size * (part + 1) // parts):
         x, y = t % tiles.columns * tiles.size, t // tiles.columns * tiles.size
         count_block(t, lists, np.int64(start[t]), np.int64(count[t]), shape, traffic, table[t])
-        count_stores(x, y, size[0], size[1], shape, addresses, table[t])
+        count_stores(x, y, size[0], size[1], shape, addresses, stores, table[t])
 
 
 def known_tiles(

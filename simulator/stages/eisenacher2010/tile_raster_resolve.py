@@ -14,7 +14,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import Samples
 
 
-@kernel
+@kernel(lent=True)
 def resolve(samples: Samples, side: int, x0: int, y0: int, image: Any, depth: Any, overdraw: Any) -> None:
     """Write the pixels of one tile that lie on the screen: mean colour, rounded; nearest depth; hits of all samples."""
     height, width = depth.shape

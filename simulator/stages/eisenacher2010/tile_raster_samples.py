@@ -28,13 +28,13 @@ class Samples(NamedTuple):
     hits: NDArray[np.int32]  # covered quads so far
 
 
-@kernel
+@kernel(lent=True)
 def edge(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any) -> Any:
     """Evaluate the edge function of a to b: twice the area of a, b and the sample."""
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
-@kernel
+@kernel(lent=True)
 def blend(a: Any, b: Any, c: Any, u: Any, v: Any, w: Any) -> Any:
     """Interpolate three packed colours; weights add up to one."""
     packed = BACKGROUND & np.uint32(0xFF000000)
@@ -45,7 +45,7 @@ def blend(a: Any, b: Any, c: Any, u: Any, v: Any, w: Any) -> Any:
     return packed
 
 
-@kernel
+@kernel(lent=True)
 def quad_box(vertices: Any, grid: int, v: int) -> tuple[Any, Any, Any, Any]:
     """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``."""
     ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, v + 1, 0], vertices[grid, v + 5, 0], vertices[grid, v + 4, 0]
@@ -55,7 +55,7 @@ def quad_box(vertices: Any, grid: int, v: int) -> tuple[Any, Any, Any, Any]:
     return x0, y0, x1, y1
 
 
-@kernel
+@kernel(lent=True)
 def sample_span(low: Any, high: Any, origin: Any, side: int, samples: int) -> tuple[int, int]:
     """First and last sample inside low..high on an axis of ``samples`` that starts at ``origin``, ``side`` a pixel.
 
@@ -66,7 +66,7 @@ def sample_span(low: Any, high: Any, origin: Any, side: int, samples: int) -> tu
     return int(min(max(first, 0.0), samples)), int(max(min(last, samples - 1.0), -1.0))
 
 
-@kernel
+@kernel(lent=True)
 def sample_quad(
     vertices: Any, colors: Any, grid: int, v: int, span: Any, origin: Any, shape: Any, samples: Samples, row: Any
 ) -> tuple[int, int, int, int]:
