@@ -77,3 +77,9 @@ def load(tmp_path: Path) -> "Callable[..., Scene]":
         return load_scene(tmp_path / name)
 
     return loaded
+
+
+@pytest.fixture(autouse=True)
+def _no_terminal_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Print as into a pipe: workers of pytest-xdist are given the columns of the terminal that started them."""
+    monkeypatch.delenv("COLUMNS", raising=False)

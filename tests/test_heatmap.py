@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 100, 75  # 4 and 3 pixels over whole tiles
     ],
 )
 def test_every_pixel_that_is_drawn_lies_in_a_cell_that_counts_something(pipeline, scene, counter, options):
-    run = simulate(scene, pipeline, "gtx480", width=WIDTH, height=HEIGHT, **options)
+    run = simulate(scene, pipeline, "h200", width=WIDTH, height=HEIGHT, **options)
     frame = run.frame
     cells = frame.maps[counter] > 0
     left, _, bottom, top = extent(cells.shape, HEIGHT, frame.tile, from_below=frame.tiles_from_below)

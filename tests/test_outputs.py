@@ -15,6 +15,7 @@ from tilestamp.experiments.command_line import BAD_INPUT, INTERRUPTED, run_comma
 from tilestamp.experiments.commands.examples import EXAMPLES
 from tilestamp.experiments.commands.outputs import check_file, write_json, writing
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator import simulation
 
 MAIN = [sys.executable, "-c", "from tilestamp.experiments.command_line import main; main()"]
 SMALL = ["render", "teapot", "--size", "64x48"]
@@ -79,7 +80,7 @@ def test_a_terminal_without_the_letters_of_a_name_shows_them_escaped(tmp_path):
 
 
 def test_an_interrupt_is_one_line(monkeypatch, capsys):
-    monkeypatch.setattr("tilestamp.simulator.simulation.simulate", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(simulation, "simulate", lambda *_, **__: signal.raise_signal(signal.SIGINT))
     assert run_command(SMALL) == INTERRUPTED
     assert capsys.readouterr().err == "tilestamp: interrupted; nothing was half-written\n"
 

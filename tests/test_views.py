@@ -177,9 +177,10 @@ def test_another_plot_or_counter_is_one_sentence(run):
 def test_a_plot_into_a_file_leaves_no_figure_open(run, tmp_path):
     from tilestamp.simulator.run_views import draw
 
+    before = plt.get_fignums()
     draw(run, "stages", tmp_path / "stages.png")
     assert (tmp_path / "stages.png").stat().st_size > 1000
-    assert plt.get_fignums() == []
+    assert plt.get_fignums() == before
 
 
 def test_the_line_of_a_study_has_its_cells_and_axes(study):
