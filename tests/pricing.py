@@ -1,7 +1,30 @@
-"""One launch at one fidelity, with bytes that are given."""
+"""One launch, by the events of its units, at one fidelity, with bytes that are given."""
 
+import numpy as np
+
+from tilestamp.models.events import EVENTS, MachineEvent
+from tilestamp.models.launch import Launch
 from tilestamp.models.price import price
 from tilestamp.models.traffic import traffic
+
+
+def launch_of(units, block=64, *, grid=None, shared_bytes=0, dispatch="blocks", streams=(), requests=None, **events):
+    """Describe units by event: one number for all, or one each."""
+    table = np.zeros((units, EVENTS))
+    for name, count in events.items():
+        table[:, MachineEvent[name]] = count
+    return Launch(
+        stage="stage",
+        kernel="kernel",
+        grid=grid or units,
+        block=block,
+        registers=16,
+        shared_bytes=shared_bytes,
+        events=table,
+        dispatch=dispatch,
+        streams=tuple(streams),
+        atomic_requests=requests,
+    )
 
 
 def bounds(launch, machine, moved):

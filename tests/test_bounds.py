@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from tests.pricing import bounds
+from tests.pricing import bounds, launch_of
 from tilestamp.models.demand import demand
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.events import EVENTS, MachineEvent
-from tilestamp.models.launch import Launch, PipeLaunch, Stream
+from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.traffic import Traffic, traffic
@@ -24,23 +23,9 @@ H200 = load_machine("h200")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 
 
-def launch(units=3000, block=64, dispatch="blocks", streams=(), requests=None, **events):
+def launch(units=3000, block=64, **described):
     """Describe equal units that each have these events."""
-    table = np.zeros((units, EVENTS))
-    for name, count in events.items():
-        table[:, MachineEvent[name]] = count
-    return Launch(
-        stage="stage",
-        kernel="kernel",
-        grid=units,
-        block=block,
-        registers=16,
-        shared_bytes=0,
-        events=table,
-        dispatch=dispatch,
-        streams=tuple(streams),
-        atomic_requests=requests,
-    )
+    return launch_of(units, block, **described)
 
 
 def stream(buffer, op, size, footprint=None):

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import microseconds, schedule
-from tilestamp.models.events import EVENTS, MachineEvent
-from tilestamp.models.launch import Launch
+from tests.pricing import launch_of, microseconds, schedule
 from tilestamp.models.list_schedule import Pace, list_schedule, record_of
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.traffic import Traffic
@@ -80,23 +78,6 @@ def test_a_block_holds_its_place_while_memory_serves_it():
     ones, served = np.ones(2), np.array([4.0, 4.0])
     found = list_schedule(np.zeros(2), ones, np.empty(0), served, 2, 2, Pace(0.0, 0.0, 1.0), record_of(0))
     assert found[2] == 4.0 + 8.0
-
-
-def launch_of(units, block=64, shared_bytes=0, requests=None, **events):
-    """Describe blocks by event: one number for all, or one each."""
-    table = np.zeros((units, EVENTS))
-    for name, count in events.items():
-        table[:, MachineEvent[name]] = count
-    return Launch(
-        stage="stage",
-        kernel="kernel",
-        grid=units,
-        block=block,
-        registers=16,
-        shared_bytes=shared_bytes,
-        events=table,
-        atomic_requests=requests,
-    )
 
 
 AT_ONCE = altered(

@@ -7,7 +7,6 @@ import pytest
 
 from tests import naive_textured as naive
 from tests.textured_soup import soup
-from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
 from tilestamp.models.simt import Simt
@@ -21,7 +20,6 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.scenes.textured_mesh import draws, geometry
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.ru2016.fragment_shading import interpolate
-from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
 from tilestamp.simulator.stages.ru2016.tile_lists import tile_lists
 from tilestamp.simulator.stages.ru2016.tile_lists_fill import overlaps
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
@@ -41,11 +39,6 @@ def scene():
 @pytest.fixture(scope="module")
 def matrix():
     return CAMERA.matrix(WIDTH, HEIGHT)
-
-
-@pytest.fixture
-def rng_light():
-    return np.random.default_rng(3).random((HEIGHT, WIDTH), np.float32)
 
 
 def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
@@ -272,49 +265,6 @@ def test_a_degenerate_triangle_draws_nothing(matrix):
     points = np.repeat(scene.mesh.positions[:1], 3, axis=0)
     frame = draw(Scene("point", mesh=replace(scene.mesh, positions=points)), matrix, cull_backfaces=False)
     assert (frame.triangle_ids == -1).all()
-
-
-def test_occlusion_only_darkens(scene, matrix):
-    lit, dark = draw(scene, matrix).image.astype(int), draw(scene, matrix, ssao=True).image.astype(int)
-    assert (dark <= lit).all()
-    assert (dark < lit).any()
-
-
-def test_the_blur_is_the_mean_of_a_window_of_four_pixels(rng_light):
-    blurred, (work,), _ = occlusion_blur(rng_light, SIMT)
-    for y, x in [(0, 0), (1, 30), (20, 20), (HEIGHT - 1, WIDTH - 1)]:
-        window = rng_light[max(y - 2, 0) : y + 2, max(x - 2, 0) : x + 2]
-        assert blurred[y, x] == pytest.approx(window.mean(), rel=1e-6)
-    assert work.block == 144
-
-
-def test_the_blur_loads_and_stores_as_often_as_an_h200_counts():
-    """Measured on the original at 800x800: a sector for each thread that loads, and for each that stores."""
-    counts = occlusion_blur(np.ones((800, 800), np.float32), Simt()).works[0].counts()
-    assert counts["STORE_TRANSACTIONS"] == 640_000
-    assert counts["LOAD_TRANSACTIONS"] == pytest.approx(1_429_963, rel=0.01)
-    assert (counts["WARPS"], counts["BLUR_WARPS"]) == (50_000, 40_000)
-
-
-def test_a_lone_plane_is_not_occluded(matrix):
-    corners = np.array([[-9, -9, 0, 1], [9, -9, 0, 1], [0, 12, 0, 1]], np.float32)
-    plane = Scene("plane", mesh=Mesh(corners, np.array([[0, 1, 2]], np.int32)))
-    assert (draw(plane, matrix, ssao=True).image == draw(plane, matrix).image).all()
-
-
-def test_occlusion_has_the_threads_of_the_screen_and_reads_by_what_is_drawn(scene, matrix):
-    counts = []
-    for s in (scene, soup(seed=9, count=5)):
-        frame = draw(s, matrix, ssao=True)
-        counts.append((work(frame, "ambient_occlusion").counts(), int((frame.triangle_ids >= 0).sum())))
-    (one, drawn), (other, fewer) = counts
-    assert one["WARP_LANES"] == other["WARP_LANES"] == WIDTH * HEIGHT
-    assert one["LOAD_TRANSACTIONS"] - other["LOAD_TRANSACTIONS"] == 100 * (drawn - fewer)
-
-
-def test_occlusion_refuses_a_parallel_projection(scene):
-    with pytest.raises(TilestampError, match="perspective"):
-        draw(scene, np.diag([0.3, 0.3, -0.1, 1.0]), ssao=True)
 
 
 @pytest.mark.parametrize(("tile", "occupancy"), [(4, 0.25), (8, 0.5), (16, 0.5), (32, 0.5)])

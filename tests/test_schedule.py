@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.pricing import bounds, schedule
+from tests.pricing import launch_of as launch
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import altered, load_machine
@@ -22,23 +23,6 @@ GTX280 = altered(
 H200 = load_machine("h200")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 COLUMNS = ("FP32", "SHARED", "CHAIN_LOAD", "LOAD_BYTES", "ATOMIC_REQUESTS")
-
-
-def launch(units, block=64, dispatch="blocks", grid=None, **events):
-    """Describe units by event: one number for all, or one each."""
-    table = np.zeros((units, EVENTS))
-    for name, count in events.items():
-        table[:, MachineEvent[name]] = count
-    return Launch(
-        stage="stage",
-        kernel="kernel",
-        grid=grid or units,
-        block=block,
-        registers=16,
-        shared_bytes=0,
-        events=table,
-        dispatch=dispatch,
-    )
 
 
 def work_cycles(got):
@@ -67,7 +51,7 @@ def test_many_equal_units_take_what_the_roofline_says(machine, events):
 )
 def test_a_schedule_is_never_faster_than_the_roofline(units, seed, dispatch, machine):
     draw = np.random.default_rng(seed)
-    what = launch(units, 96, dispatch, 40, **{name: draw.exponential(2000, units) for name in COLUMNS})
+    what = launch(units, 96, dispatch=dispatch, grid=40, **{name: draw.exponential(2000, units) for name in COLUMNS})
     moved = Traffic(float(draw.exponential(10**7)), 0.0, 1.0)
     assert schedule(what, machine, moved).cycles >= bounds(what, machine, moved).cycles * (1 - 1e-9)
 
@@ -161,13 +145,13 @@ def test_the_same_launch_has_the_same_time():
 def test_a_queue_balances_what_a_grid_of_the_same_size_cannot():
     """Items drawn by 132 persistent blocks: none waits for a neighbour's long item."""
     work = np.tile([10.0] * 131 + [50000.0], 20)
-    queue = schedule(launch(len(work), 640, "block_queue", 132, FP32=work), H200, NOTHING)
+    queue = schedule(launch(len(work), 640, dispatch="block_queue", grid=132, FP32=work), H200, NOTHING)
     assert work_cycles(queue) < 3 * 50000 / 4 + 5000
 
 
 def test_each_warp_of_a_persistent_block_draws_its_own_item():
-    blocks = schedule(launch(132 * 20, 640, "block_queue", 132, CHAIN_LOAD=100), H200, NOTHING)
-    warps = schedule(launch(132 * 20, 640, "warp_queue", 132, CHAIN_LOAD=100), H200, NOTHING)
+    blocks = schedule(launch(132 * 20, 640, dispatch="block_queue", grid=132, CHAIN_LOAD=100), H200, NOTHING)
+    warps = schedule(launch(132 * 20, 640, dispatch="warp_queue", grid=132, CHAIN_LOAD=100), H200, NOTHING)
     assert work_cycles(blocks) > 15 * work_cycles(warps)
 
 
