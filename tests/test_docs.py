@@ -1,5 +1,6 @@
 """The documentation: what the site's pages take from the code is there, links lead somewhere, commands work."""
 
+import json
 import re
 import shlex
 from importlib import import_module
@@ -9,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from tilestamp.experiments.command_line import run_command
-from tilestamp.experiments.harness.registry import select
+from tilestamp.experiments.harness.registry import experiment_names, select
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.pipelines import pipeline_names
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "reports" / "gallery" / "README.md"])
+ROADS = sorted((ROOT / "docs" / "exploration").glob("*.md"))
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *ROADS, ROOT / "reports" / "gallery" / "README.md"])
 MADE = ("machines/", "pipelines/", "time/", "atlas.md")  # pages of the site that are made when it is built
 FLOORS = ("models", "simulator", "experiments", "reports")
 NEEDS_A_GPU = {"measure-machine", "validate"}
@@ -119,6 +121,25 @@ def test_the_atlas_shows_what_a_results_folder_has(generate, tmp_path, monkeypat
     assert "| m | p\\|q [u] | 1.2346 |  | w; cure: c |" in made["atlas.md"]
     assert '<a href="#cracks"><img src="atlas/cracks-cracks.png"' in made["atlas.md"]
     assert "`tilestamp reproduce stability/slivers` draws it" in made["atlas.md"]
+
+
+def test_a_road_shows_what_a_results_folder_has(generate, tmp_path, monkeypatch):
+    result = tmp_path / "exploration-shading"
+    result.mkdir()
+    said = {"answer": "So much.", "notes": ["So much.", "More."], "figures": [{"file": "plot.png", "alt": "Lines"}]}
+    (result / "result.json").write_text(json.dumps(said))
+    (result / "plot.png").write_bytes(b"plot")
+    monkeypatch.setenv("TILESTAMP_RESULTS", str(tmp_path))
+    room = generate("result_pages")
+    monkeypatch.setattr(room, "describe", lambda _: "Title.")
+    page = room.with_results("a\n\n<!-- result exploration/shading -->\n")
+    assert page == "a\n\nSo much.\n\n- More.\n\n![Lines](shading-plot.png){ loading=lazy }\n"
+
+
+def test_every_road_has_a_page_that_shows_its_result():
+    names = [name for name in experiment_names() if name.startswith("exploration/")]
+    shown = {mark for page in ROADS for mark in re.findall(r"<!-- result (\S+) -->", page.read_text("utf-8"))}
+    assert set(names) == shown
 
 
 def test_the_table_of_silicon_has_the_measured_beside_the_model(generate):

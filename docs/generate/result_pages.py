@@ -1,7 +1,11 @@
-"""Results: all experiments, and the stability atlas as a gallery of what a results folder has (TILESTAMP_RESULTS)."""
+"""Results: all experiments, and of a results folder (TILESTAMP_RESULTS) the stability atlas and the roads not taken.
+
+A page in ``docs/exploration`` says ``<!-- result exploration/NAME -->`` where the answer and the plots of a run belong.
+"""
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from html import escape
 from importlib import import_module
@@ -16,7 +20,8 @@ from tilestamp.experiments.harness.registry import FOLDER as EXPERIMENTS
 from tilestamp.experiments.harness.registry import describe, describe_folder, experiment_names, is_slow
 
 RESULTS = "TILESTAMP_RESULTS"  # names what `tilestamp reproduce -o FOLDER` left
-ATLAS = "stability"
+ATLAS, ROADS = "stability", "exploration"
+RESULT = re.compile(r"<!-- result (exploration/\w+) -->")
 EXPERIMENTS_HEAD = """# Experiments
 
 Each compares published or measured cells with ours, cell by cell, or answers a question.
@@ -40,8 +45,49 @@ tilestamp reproduce stability
 
 def pages() -> dict[str, str | bytes]:
     """The list of experiments, the atlas and its pictures."""
+    made: dict[str, str | bytes] = {"experiments.md": _experiments()} | _atlas()
+    for name in experiment_names():
+        if name.startswith(f"{ROADS}/"):
+            made |= {f"{ROADS}/{place}": path.read_bytes() for place, path in _plots(name).items()}
+    return made
+
+
+def with_results(markdown: str) -> str:
+    """A page with the answer and the plots of each run that it asks for."""
+    return RESULT.sub(lambda mark: _found(mark[1]), markdown)
+
+
+def _found(name: str) -> str:
+    """What a run found: its answer, what else it noted, its plots."""
+    said = _said(name)
+    told = [said["answer"], *(f"- {note}" for note in said["notes"] if note != said["answer"])] if said else []
+    return "\n\n".join([*told, *_drawn(name, _plots(name), describe(name).rstrip("."))])
+
+
+def _result(name: str) -> Path | None:
+    """Where the result of an experiment is, where there is a folder of results."""
     folder = os.environ.get(RESULTS)
-    return {"experiments.md": _experiments()} | _atlas(Path(folder) if folder else None)
+    return Path(folder) / name.replace("/", "-") if folder else None
+
+
+def _said(name: str) -> dict[str, Any]:
+    """What a result says, if there is one."""
+    result = _result(name)
+    path = result / "result.json" if result else None
+    return json.loads(path.read_text("utf-8")) if path and path.is_file() else {}
+
+
+def _plots(name: str) -> dict[str, Path]:
+    """Plots of a result, by a name that no other experiment of its folder has."""
+    result, short = _result(name), name.partition("/")[2]
+    return {f"{short}-{path.name}": path for path in sorted(result.glob("*.png"))} if result else {}
+
+
+def _drawn(name: str, plots: Mapping[str, Path], title: str, room: str = "") -> list[str]:
+    """The plots, as lines of a page; else what draws them."""
+    figures = {figure["file"]: figure.get("alt") for figure in _said(name).get("figures", [])}
+    drawn = [f"![{figures.get(path.name) or title}]({room}{place}){{ loading=lazy }}" for place, path in plots.items()]
+    return drawn or [f"`tilestamp reproduce {name}` draws it."]
 
 
 def detailed() -> str:
@@ -63,24 +109,21 @@ def _experiments() -> str:
     return text
 
 
-def _atlas(folder: Path | None) -> dict[str, str | bytes]:
+def _atlas() -> dict[str, str | bytes]:
     made: dict[str, str | bytes] = {}
     thumbnails, sections = "", ""
     for name in experiment_names():
         if not name.startswith(f"{ATLAS}/"):
             continue
         short, title = name.partition("/")[2], describe(name).rstrip(".")
-        result = folder / name.replace("/", "-") if folder else Path()
-        plots = {f"atlas/{short}-{path.name}": path for path in sorted(result.glob("*.png"))} if folder else {}
-        made |= {place: path.read_bytes() for place, path in plots.items()}
-        drawn = [f"![{_alt(result, path.name, title)}]({place}){{ loading=lazy }}" for place, path in plots.items()]
-        drawn = drawn or [f"`tilestamp reproduce {name}` draws it."]
-        parts = [f"## {title} {{ #{short} }}", _about(name), *drawn, _boundaries(result)]
+        plots = _plots(name)
+        made |= {f"atlas/{place}": path.read_bytes() for place, path in plots.items()}
+        drawn = _drawn(name, plots, title, "atlas/")
+        parts = [f"## {title} {{ #{short} }}", _about(name), *drawn, _boundaries(_result(name) or Path())]
         sections += "\n\n".join(parts) + "\n\n"
         if plots:
-            thumbnails += (
-                f'<a href="#{short}"><img src="{next(iter(plots))}" alt="" loading="lazy">{escape(short)}</a>\n'
-            )
+            first = f"atlas/{next(iter(plots))}"
+            thumbnails += f'<a href="#{short}"><img src="{first}" alt="" loading="lazy">{escape(short)}</a>\n'
     made["atlas.md"] = f'{ATLAS_HEAD}\n<div class="thumbnails">\n{thumbnails}</div>\n\n{sections}'
     return made
 
@@ -113,14 +156,6 @@ def _short(value: object) -> str:
         return f"{float(str(value)):.5g}"
     except ValueError:
         return str(value)
-
-
-def _alt(result: Path, name: str, otherwise: str) -> str:
-    """What a plot shows, where the result says so."""
-    said: dict[str, Any] = json.loads(path.read_text("utf-8")) if (path := result / "result.json").is_file() else {}
-    return next(
-        (plot["alt"] for plot in said.get("figures", []) if plot["file"] == name and plot.get("alt")), otherwise
-    )
 
 
 TABLES = {"<!-- detailed simulators -->": detailed}

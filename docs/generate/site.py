@@ -55,7 +55,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001 - a hook's
     """Pages of the repository link to files of the repository: those that the site has, it has elsewhere."""
-    text = architecture_picture.drawn(markdown)
+    text = result_pages.with_results(architecture_picture.drawn(markdown))
     for mark, made in (result_pages.TABLES | model_tables.TABLES).items():
         text = text.replace(mark, made()) if mark in text else text
     return "\n".join(_linked(text.split("\n"), page.file.src_uri.count("/")))

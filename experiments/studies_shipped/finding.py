@@ -1,4 +1,4 @@
-"""What all shipped studies say, and how: numbers and sentences are computed from the run, none is typed."""
+"""What shipped studies and roads not taken say, and how: numbers and sentences are computed from the run."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -29,10 +29,11 @@ def finding(
     tables: Mapping[str, "pd.DataFrame"],
     warnings: Sequence[str] = (),
     charts: Sequence[Chart] = (),
+    folder: str = "studies_shipped",
 ) -> Result:
-    """Make the result of a shipped study."""
+    """Make the result of an experiment beside which nothing is published; its first note is its answer."""
     return Result(
-        name=f"studies_shipped-{name}", title=title, source=SOURCE, cells=list(cells), answer=notes[0],
+        name=f"{folder}-{name}", title=title, source=SOURCE, cells=list(cells), answer=notes[0],
         figures=list(figures), charts=list(charts),
         notes=list(notes), warnings=list(warnings), tables=dict(tables),
     )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Roads not taken: what the papers leave for future work, built, counted and priced."""
