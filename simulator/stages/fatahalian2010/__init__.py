@@ -1,0 +1,1 @@
+"""Fatahalian et al. 2010: quad-fragment merging."""
