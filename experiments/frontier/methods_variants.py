@@ -55,6 +55,9 @@ BINNED = [
 STAMPS = [
     Variant("stamps", f"stamp {stamp}, {spp} spp", {"stamp": stamp, "spp": spp})
     for stamp, spp in ((2, 1), (4, 1), (8, 1), (4, 4), (4, 16))
+] + [
+    Variant("stamps", f"shaded in quads, {name}, 4 spp", {"stamp": 2, "spp": 4, "merge_entries": entries})
+    for name, entries in (("not merged", 0), ("merged", 32))
 ]
 ACROSS = [Variant("across-polygons", f"{spp} spp", {"spp": spp}) for spp in (1, 4, 16)]
 BIT_MASK = [

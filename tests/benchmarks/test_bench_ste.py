@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
+from tilestamp.experiments.exploration import quad_merging
 from tilestamp.experiments.ste.setting import cube
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.simulator.stages.fatahalian2010.quad_shading import quad_shading
 
 MICROQUADS = 4_000_000
 WIDTH, HEIGHT = 1600, 1200
@@ -39,3 +43,13 @@ def test_subdivide_bigguy_to_sub_pixel_size(benchmark, shared):
 
     surface = surface_of(read_cage(shared / "scenes" / "cages" / "bigguy.obj"))
     benchmark(lambda: limit_positions(subdivide(surface, 5)))
+
+
+@pytest.mark.parametrize("entries", [0, 32])
+def test_merge_quads_of_pixel_sized_triangles(benchmark, entries):
+    polygons, simt = quad_merging.mesh(0.5, 256), Simt()
+
+    def draw():
+        quad_shading(polygons, new_samples(256, 256, sample_positions(4)), entries, simt)
+
+    benchmark(draw)

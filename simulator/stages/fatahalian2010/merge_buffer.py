@@ -102,7 +102,7 @@ def join(buffer: MergeBuffer, i: int, polygon: int, mask: Any, covers: Any, spp:
 
 
 @kernel
-def start(buffer: MergeBuffer, place: int, facing: int) -> int:
+def start(buffer: MergeBuffer, place: int, facing: int) -> Any:
     """Take the next entry, which must be free, for a quad; returns it, counted from the start."""
     i = buffer.span[1]
     e = i % len(buffer.place)

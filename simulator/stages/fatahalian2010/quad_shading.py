@@ -7,7 +7,7 @@ entries its lanes compare with a quad 32 at a time; quads that leave it are shad
 """
 
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ BATCH = 1024  # polygons that a warp takes from the queue together
 WARPS = 4  # in a block
 QUAD_BYTES = 16  # polygon, place, covered samples: written by the rasterizer, read here; both are counted here
 COLOR_BYTES = 4
-ENTRY_BYTES = 48  # of the buffer in shared memory: place, facing, samples, and the last eight polygons
+ENTRY_BYTES = 48  # of the buffer in shared memory: place and facing, samples, polygon at each pixel, and vertices
 
 
 @shown(
@@ -62,6 +62,21 @@ class QuadEvent(IntEnum):
     STORE_BYTES = 13
 
 
+class ShadedQuads(NamedTuple):
+    """What was shaded.
+
+    Parameters
+    ----------
+    seen : ndarray, (H * W * spp,), int32
+        Polygon whose colour each sample has, -1 for none: without merging the visible one.
+    shades : ndarray, (ceil(H / 2), ceil(W / 2)), int32
+        How often the quad at each place was shaded.
+    """
+
+    seen: NDArray[np.int32]
+    shades: NDArray[np.int32]
+
+
 def corner_numbers(polygons: Micropolygons) -> NDArray[np.int64]:
     """Number of each vertex, (M, 3 or 4): the same where polygons have the same one."""
     _, number = np.unique(polygons.vertices.reshape(-1, 3), axis=0, return_inverse=True)
@@ -69,8 +84,8 @@ def corner_numbers(polygons: Micropolygons) -> NDArray[np.int64]:
 
 
 def quad_shading(
-    polygons: Micropolygons, samples: Samples, entries: int, simt: Simt, shared: int = 2
-) -> StageResult[NDArray[np.int32]]:
+    polygons: Micropolygons, samples: Samples, entries: int, simt: Simt, shared: int = 1
+) -> StageResult[ShadedQuads]:
     """Gather the visible quads of polygons in order, merge them, and say which polygon each sample is shaded by.
 
     Parameters
@@ -81,23 +96,27 @@ def quad_shading(
     entries : int
         Of the merge buffer; 0: every quad is shaded as it comes.
     simt : Simt
+    shared : int
+        Vertices that adjacent polygons share, at least: 2 an edge, 1 a corner, 0 none.
 
     Returns
     -------
-    outputs : ndarray, (H * W * spp,), int32
-        Polygon whose colour each sample has, -1 for none: without merging the visible one.
+    outputs : ShadedQuads
     works : one, a row for each batch of 1024 polygons
     """
     table = np.zeros((-(-len(polygons.patch) // BATCH), len(QuadEvent)), np.int64)
-    seen = np.full(len(samples.polygon), -1, np.int32)
-    _quad_shading(polygons.vertices, corner_numbers(polygons), samples, entries, shared, seen, Simt(*map(int, simt)), table)
+    shades = np.zeros(((samples.height + 1) // 2, (samples.width + 1) // 2), np.int32)
+    shaded = ShadedQuads(np.full(len(samples.polygon), -1, np.int32), shades)
+    _quad_shading(
+        polygons.vertices, corner_numbers(polygons), samples, entries, shared, shaded, Simt(*map(int, simt)), table
+    )
     total = table.sum(axis=0)
     quads = int(total[QuadEvent.QUADS]) * QUAD_BYTES
     colors = int(total[QuadEvent.STORE_BYTES]) - quads
     streams = (
         Stream("quads", "load", quads, quads),
         Stream("quads", "store", quads, quads),
-        Stream("colors", "store", colors, min(colors, COLOR_BYTES * len(seen))),
+        Stream("colors", "store", colors, min(colors, COLOR_BYTES * len(shaded.seen))),
     )
     work = Work(
         stage="quad_shading",
@@ -110,15 +129,22 @@ def quad_shading(
         dispatch="warp_queue",
         streams=streams,
     )
-    return StageResult(seen, (work,))
+    return StageResult(shaded, (work,))
 
 
 @kernel
 def _quad_shading(
-    vertices: Any, corners: Any, samples: Samples, entries: int, shared: int, seen: Any, simt: Simt, table: Any
+    vertices: Any,
+    corners: Any,
+    samples: Samples,
+    entries: int,
+    shared: int,
+    shaded: ShadedQuads,
+    simt: Simt,
+    table: Any,
 ) -> None:
     setup, buffer = new_setup(), new_buffer(max(entries, 1))
-    owner = np.full(len(seen), -1, np.int64)  # entry that each sample was last written by
+    owner = np.full(len(shaded.seen), -1, np.int64)  # entry that each sample was last written by
     covers = np.zeros(PIXELS, np.bool_)
     for batch in range(len(table)):
         row = table[batch]
@@ -131,9 +157,11 @@ def _quad_shading(
                 for i in range(x0 >> (STEP_BITS + 1), (x1 >> (STEP_BITS + 1)) + 1):
                     mask = _visible(p, setup, samples, i, j, covers, row)
                     if mask != np.uint64(0):
-                        _offer(p, facing, i, j, mask, covers, corners, shared, samples, entries, buffer, owner, seen, row)
+                        _offer(
+                            p, facing, i, j, mask, covers, corners, shared, samples, entries, buffer, owner, shaded, row
+                        )
         while buffer.span[0] < buffer.span[1]:
-            _shade(buffer, samples, owner, seen, row)
+            _shade(buffer, samples, owner, shaded, row)
         _count_batch(entries, simt, row)
 
 
@@ -160,8 +188,8 @@ def _visible(p: int, setup: Any, samples: Samples, i: int, j: int, covers: Any, 
 
 @kernel
 def _offer(
-    p: int, facing: int, i: int, j: int, mask: Any, covers: Any, corners: Any, shared: int, samples: Samples, entries: int,
-    buffer: MergeBuffer, owner: Any, seen: Any, row: Any,
+    p: int, facing: int, i: int, j: int, mask: Any, covers: Any, corners: Any, shared: int, samples: Samples,
+    entries: int, buffer: MergeBuffer, owner: Any, shaded: ShadedQuads, row: Any,
 ) -> None:  # fmt: skip
     """Put one quad into the buffer, the oldest entry making room where it joins none of a full one."""
     spp, place = len(samples.offsets), j * ((samples.width + 1) >> 1) + i
@@ -172,7 +200,7 @@ def _offer(
         row[QuadEvent.MERGED_QUADS] += 1
     else:
         if buffer.span[1] - buffer.span[0] == len(buffer.place):
-            _shade(buffer, samples, owner, seen, row)
+            _shade(buffer, samples, owner, shaded, row)
         entry = start(buffer, place, facing)
     join(buffer, entry, p, mask, covers, spp)
     for k in range(PIXELS):
@@ -183,19 +211,20 @@ def _offer(
 
 
 @kernel
-def _shade(buffer: MergeBuffer, samples: Samples, owner: Any, seen: Any, row: Any) -> None:
+def _shade(buffer: MergeBuffer, samples: Samples, owner: Any, shaded: ShadedQuads, row: Any) -> None:
     """Shade the oldest entry and let it go; samples that a later quad has taken since keep that one's colour."""
     i, spp, wide = buffer.span[0], len(samples.offsets), (samples.width + 1) >> 1
     e = i % len(buffer.place)
     buffer.span[0] += 1
     row[QuadEvent.SHADED_QUADS] += 1
+    shaded.shades[buffer.place[e] // wide, buffer.place[e] % wide] += 1
     left, top = 2 * (buffer.place[e] % wide), 2 * (buffer.place[e] // wide)
     for k in range(PIXELS):
         row[QuadEvent.HELPERS] += buffer.seen[e, k] < 0
         at = ((top + (k >> 1)) * samples.width + left + (k & 1)) * spp
         for s in range(spp):
             if (buffer.mask[e] >> np.uint64(k * spp + s)) & np.uint64(1) and owner[at + s] == i:
-                seen[at + s] = buffer.seen[e, k]
+                shaded.seen[at + s] = buffer.seen[e, k]
 
 
 @kernel

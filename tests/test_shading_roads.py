@@ -1,0 +1,43 @@
+"""Roads not taken in shading: each experiment runs in small, draws, and says what its numbers say."""
+
+import pytest
+
+from tilestamp.experiments.exploration import quad_merging
+from tilestamp.experiments.harness.write import draw_figure
+
+SMALL = {
+    quad_merging: {
+        "AREAS": (0.5, 10.0),
+        "ENTRIES": (1, 32),
+        "SIDE": 24,
+        "FRAME": {"width": 40, "height": 30, "spp": 4, "stamp": 2, "triangles": True},
+    },
+}
+
+
+@pytest.fixture(params=SMALL, ids=lambda module: module.__name__.rpartition(".")[2])
+def small(request, monkeypatch):
+    """A road in small."""
+    for name, value in SMALL[request.param].items():
+        monkeypatch.setattr(request.param, name, value)
+    return request.param
+
+
+def test_a_road_has_cells_sentences_and_pictures(small, tmp_path):
+    result = small.run(lambda _: None)
+    assert result.cells
+    assert result.answer
+    assert all(note.endswith(".") for note in result.notes)
+    for figure in result.figures:
+        draw_figure(figure, result, tmp_path / figure.name)
+
+
+@pytest.mark.parametrize(("spp", "aim"), [(4, 0.17), (16, 0.15)])
+def test_merging_divides_shading_of_pixel_sized_triangles_by_about_eight(spp, aim):
+    polygons = quad_merging.mesh(0.5)
+    factor = quad_merging.shaded(polygons, spp, 0)[0] / quad_merging.shaded(polygons, spp, 32)[0]
+    assert factor == pytest.approx(quad_merging.PUBLISHED, rel=aim)
+
+
+def test_a_mesh_covers_every_sample_once():
+    assert quad_merging.shaded(quad_merging.mesh(2.0), 16, 0)[1].min() >= 1
