@@ -26,8 +26,8 @@ QUESTION = "By how much does merging quads of neighbouring triangles reduce shad
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
 PUBLISHED = 8.0  # times less shading of pixel-sized triangles
 SOURCE = (
-    "Fatahalian et al. 2010, abstract: a small buffer reduces the shading of pixel-sized triangles by a factor of eight;"
-    " samples a pixel, entries and exact area are not said there. Pixel-sized here: legs of a pixel, 0.5 pixels of area"
+    "Fatahalian et al. 2010, abstract: a small buffer reduces the shading of pixel-sized triangles by a factor of"
+    " eight; samples a pixel, entries and exact area are not said there. Pixel-sized here: legs of a pixel, 0.5 pixels of area"
 )
 SIDE = 64  # pixels of the screen
 BLOCK = 16  # cells on a side of a block of the mesh, drawn block by block as a tessellator makes them
@@ -176,13 +176,13 @@ def _notes(buffers: "pd.DataFrame", frames: "pd.DataFrame") -> list[str]:
     first = frames.iloc[0]
     return [
         (
-            f"Triangles of 10 pixels, 4 samples: {large[BUFFER]:.2f} with {BUFFER} entries, {large[max(ENTRIES)]:.2f} with"
-            f" {max(ENTRIES)}: the larger the triangles, the longer a quad waits for the row behind."
+            f"Triangles of 10 pixels, 4 samples: {large[BUFFER]:.2f} with {BUFFER} entries, {large[max(ENTRIES)]:.2f}"
+            f" with {max(ENTRIES)}: the larger the triangles, the longer a quad waits for the row behind."
         ),
         (
-            f"In software a warp that looks through {BUFFER} entries for every quad pays only with a shader of more than"
-            f" {row.pays_from:.0f} instructions, by instructions issued (teapot, 4 samples, {MACHINE}; the mix is counted"
-            f" by hand); with one of 66 the stage takes {row.ms:.3f} ms with merging, {first.ms:.3f} without."
+            f"In software a warp that looks through {BUFFER} entries for every quad pays only with a shader of more"
+            f" than {row.pays_from:.0f} instructions, by instructions issued (teapot, 4 samples, {MACHINE}; the mix is"
+            f" counted by hand); with one of 66 the stage takes {row.ms:.3f} ms with merging, {first.ms:.3f} without."
         ),
         f"Merging changes the picture by a FLIP error of {row.flip:.5f}; at one sample a pixel, by none.",
         SURE,
