@@ -27,7 +27,8 @@ SLOW = True  # runs when it is named: tilestamp reproduce exploration
 PUBLISHED = 8.0  # times less shading of pixel-sized triangles
 SOURCE = (
     "Fatahalian et al. 2010, abstract: a small buffer reduces the shading of pixel-sized triangles by a factor of"
-    " eight; samples a pixel, entries and exact area are not said there. Pixel-sized here: legs of a pixel, 0.5 pixels of area"
+    " eight; samples a pixel, entries and exact area are not said there. Pixel-sized here: legs of a pixel, an area"
+    " of 0.5 pixels"
 )
 SIDE = 64  # pixels of the screen
 BLOCK = 16  # cells on a side of a block of the mesh, drawn block by block as a tessellator makes them
