@@ -8,6 +8,7 @@ Modelled
 - All four kernels of both releases to the bit: queues, segments, input order, clipping, snapping, pictures,
   counters.
 - Batches, samples (1 to 8), four modes, and attempts that fail because a queue is too short (``first_frame``).
+- A program in the ROP (``blend``), a user's function too.
 - What nvdiffrast's copy of the parameters to local memory costs (``copy_parameters``).
 
 Not modelled
@@ -44,9 +45,12 @@ from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_ma
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.blend_programs import BUILT_IN, find_program
+from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
 from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
+from tilestamp.simulator.stages.laine2011.programmable_rop import needs_depth, programmable_rop
 from tilestamp.simulator.stages.laine2011.triangle_setup import (
     MAX_SUBTRIANGLES,
     SLACK,
@@ -54,7 +58,9 @@ from tilestamp.simulator.stages.laine2011.triangle_setup import (
     as_published,
     triangle_setup,
 )
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.stages.vertex_transform import clip_positions, triangle_mesh, vertex_colors
+from tilestamp.simulator.work import Work
 
 
 class CudarasterOptions(Options, frozen=True, kw_only=True):
@@ -80,6 +86,11 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     """Leave triangles whole that leave the screen by less than 2048 pixels; none: on in 1.1, off in nvdiffrast, whose
     copies differ: some have it on. As in the original, a clipped triangle beside a whole one then leaves holes along
     their edge (experiment stability/guard_band)."""
+    blend: str = "over"
+    """Program of the ROP, mode blend: over, additive, max, multiply, nearest, k-buffer, stochastic, or MODULE:NAME of a
+    Numba function of yours (``tilestamp.simulator.stages.laine2011.blend_programs``)."""
+    layers: Annotated[int, Meta(ge=1, le=32)] = 4
+    """Fragments that a k-buffer keeps of a pixel; samples of stochastic transparency."""
     batches: Annotated[int, Meta(ge=1, le=1024)] = 1
     """Draws that the triangles are divided among; the first clears."""
     copy_parameters: bool = False
@@ -94,8 +105,17 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
             msgspec.structs.force_setattr(self, name, as_published(getattr(self, name), self.release))
         if self.release == "nvdiffrast" and (self.mode != "depth" or self.msaa != 1):
             raise TilestampError(f"release nvdiffrast has mode depth and msaa 1, not {self.mode} and {self.msaa}")
+        if self.blend not in BUILT_IN:
+            find_program(self.blend)
+        if self.programmable and (self.mode != "blend" or self.msaa != 1 or self.batches != 1):
+            raise TilestampError(f"blend {self.blend}: only mode blend, with msaa 1 and batches 1, has other programs")
         if self.copy_parameters and self.release != "nvdiffrast":
             raise TilestampError(f"copy_parameters: release {self.release} does not copy them; nvdiffrast does")
+
+    @property
+    def programmable(self) -> bool:
+        """Whether the ROP runs a program."""
+        return self.blend != BUILT_IN[0]
 
 
 @dataclass
@@ -153,7 +173,8 @@ def cudaraster(
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    colors = None if options.mode == "depth-only" or not execute.picture else vertex_colors(mesh, matrix)
+    shaded = options.programmable or (options.mode != "depth-only" and execute.picture)
+    colors = vertex_colors(mesh, matrix) if shaded else None
     state = _State(options, execute, (width, height), simt, colors)
     for first, last in _batch_bounds(len(mesh.triangles), options.batches):
         _draw(state, positions, mesh.triangles[first:last], first)
@@ -186,13 +207,15 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     """
     options, execute, (width, height) = state.options, state.execute, state.size
     depth, _, _, interpolate = MODES[options.mode]
+    planes = depth or (options.programmable and needs_depth(options.blend))
     shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": options.release}
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
     while True:
         setup, prepared, facts = execute(
-            triangle_setup, positions, triangles, **shape, samples=options.msaa, depth=depth, interpolate=interpolate,
-            cull_backfaces=options.cull_backfaces, guard_band=options.guard_band, variant=options.mode,
+            triangle_setup, positions, triangles, **shape, samples=options.msaa, depth=planes, interpolate=interpolate,
+            cull_backfaces=options.cull_backfaces, guard_band=options.guard_band,
+            variant=options.mode if planes == depth else "depth",
             capacity=state.capacity["numSubtris"] if options.first_frame else MAX_SUBTRIANGLES,
         )  # fmt: skip
         if _grow(state, "numSubtris", facts["numSubtris"], SLACK):
@@ -204,10 +227,7 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         if not _grow(state, "numTileSegs", tile_facts["num_tile_segments"], SLACK):
             break
     setup = setup._replace(inputs=setup.inputs + np.int32(first)) if first else setup
-    buffers, drawn, _ = (execute.last if options.batches == 1 else execute)(
-        fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, samples=options.msaa,
-        mode=options.mode, colors=state.colors, buffers=state.buffers,
-    )  # fmt: skip
+    buffers, drawn = _draw_tiles(state, setup, lists)
     state.buffers = buffers
     if execute.counting:
         visible = int(np.count_nonzero(setup.subtriangles))
@@ -215,6 +235,19 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
         counters |= tile_facts["counters"] | fine_counters(drawn[0], depth=depth, msaa=options.msaa)
         state.counters = add_counters(state.counters, counters)
     tile_maps(state.maps, lists, drawn[0] if execute.counting else None)
+
+
+def _draw_tiles(state: _State, setup: Setup, lists: TileQueues) -> tuple[FrameBuffers, tuple[Work, ...]]:
+    """Fine raster, as published or with a program in its ROP."""
+    options, execute = state.options, state.execute
+    inputs = setup, lists.starts, lists.entries, lists.active, *state.size, state.simt
+    if options.programmable:
+        assert state.colors is not None  # noqa: S101 - made where there is a program
+        return execute(programmable_rop, *inputs, program=options.blend, layers=options.layers, colors=state.colors)[:2]
+    return (execute.last if options.batches == 1 else execute)(
+        fine_raster, *inputs, release=options.release, samples=options.msaa,
+        mode=options.mode, colors=state.colors, buffers=state.buffers,
+    )[:2]  # fmt: skip
 
 
 def _initial_capacity(state: _State, triangles: int) -> None:

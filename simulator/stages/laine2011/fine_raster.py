@@ -183,6 +183,38 @@ def clear_depth_value(depth: float) -> int:
     return int(whole / (2**32 - 1) * (DEPTH_MAX - DEPTH_MIN) + DEPTH_MIN)
 
 
+def draw_of(
+    width: int,
+    height: int,
+    simt: Simt,
+    *,
+    release: Release,
+    mode: Mode,
+    samples: int = 1,
+    clear: bool = True,
+    clear_color: int = 0,
+    clear_depth: float = 1.0,
+) -> Draw:
+    """Switches of a draw as the kernels take them; parameters as of ``fine_raster``."""
+    depth, blend, write_color, interpolate = MODES[mode]
+    return Draw(
+        log_samples=samples.bit_length() - 1,
+        later_wins=release == "nvdiffrast",
+        depth=depth,
+        blend=blend,
+        write_color=write_color,
+        interpolate=interpolate,
+        shade_late=write_color and not blend and samples == 1 and release == "1.1",
+        clear=clear,
+        clear_color=clear_color,
+        clear_depth=clear_depth_value(clear_depth),
+        half_width=8 * width,
+        half_height=8 * height,
+        tiles_x=-(-width // TILE),
+        coalescing=int(simt.coalescing),
+    )
+
+
 @divisible(known=known_tiles, work=fine_work)
 def fine_raster(
     setup: Setup,
@@ -240,25 +272,12 @@ def fine_raster(
     works : one, a row an active tile
 
     """
-    depth, blend, write_color, interpolate = MODES[mode]
-    draw = Draw(
-        log_samples=samples.bit_length() - 1,
-        later_wins=release == "nvdiffrast",
-        depth=depth,
-        blend=blend,
-        write_color=write_color,
-        interpolate=interpolate,
-        shade_late=write_color and not blend and samples == 1 and release == "1.1",
-        clear=buffers is None,
-        clear_color=clear_color,
-        clear_depth=clear_depth_value(clear_depth),
-        half_width=8 * width,
-        half_height=8 * height,
-        tiles_x=-(-width // TILE),
-        coalescing=int(simt.coalescing),
-    )
+    draw = draw_of(
+        width, height, simt, release=release, mode=mode, samples=samples, clear=buffers is None,
+        clear_color=clear_color, clear_depth=clear_depth,
+    )  # fmt: skip
     if colors is None:
-        colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1 if write_color else 1, 4), np.float32)
+        colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1 if draw.write_color else 1, 4), np.float32)
     drawn = active_tiles if units is None else active_tiles[units]
     if buffers is None:
         buffers = new_buffers(width, height, samples, cleared=units is None and len(drawn) < len(tile_starts) - 1)

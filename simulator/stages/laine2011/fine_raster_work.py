@@ -18,6 +18,8 @@ from tilestamp.simulator.work import Work
 WARPS = 20  # a block
 TABLE_BYTES = 6144  # edge coverage, shared
 WARP_BYTES = {1: 2112, 2: 1856, 4: 1856, 8: 1856}
+SHARED_BYTES = 48 << 10  # a block can have at most
+WORD_BYTES = 4 * PIXELS  # of a warp, for each further word that its pixels keep
 START_LOADS = 3  # of a warp that starts: whether a buffer was too small
 DRAW_REQUESTS = {"1.1": 1, "nvdiffrast": 2}  # of a draw, to one sector: the counter; and the number of tiles beside it
 SAMPLE_SECONDS, ENTRY_SECONDS = 50e-9, 1e-6  # CPU time of a sample, and of an entry of a tile's list
@@ -58,11 +60,17 @@ def fine_work(
     release: Release,
     samples: int,
     mode: str,
+    words: int = 1,
     **_: Any,
 ) -> Work:
-    """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``."""
-    table = _with_starts(rows, WARPS * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
-    shared = TABLE_BYTES + WARPS * WARP_BYTES[samples] + (2**samples if samples > 1 else 0)
+    """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``.
+
+    With more ``words`` of colour a pixel than one there are as many warps as shared memory has room for.
+    """
+    each = WARP_BYTES[samples] + (words - 1) * WORD_BYTES
+    warps = min(WARPS, (SHARED_BYTES - TABLE_BYTES) // each)
+    table = _with_starts(rows, warps * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
+    shared = TABLE_BYTES + warps * each + (2**samples if samples > 1 else 0)
     queue = np.array([DRAW_REQUESTS[release] * table[:, FineRasterEvent.ATOMIC].sum()])
     return Work(
         stage="fine_raster",
@@ -70,7 +78,7 @@ def fine_work(
         events=FineRasterEvent,
         table=table,
         grid=simt.sms,
-        block=32 * WARPS,
+        block=32 * warps,
         shared_bytes=shared,
         dispatch="warp_queue",
         streams=_streams(table, setup, len(tile_entries), width, height, samples),
