@@ -190,7 +190,7 @@ def tiled_raster(
     parts = parts_of(-(-height // tile))
     for_parts(_tiled_raster, parts, screen, triangles, *lists, tile, simt.warp, *visible, events)
     _add_traffic(events, simt, tile)
-    drawn = len(np.unique(lists.entries))
+    drawn = int(np.count_nonzero(np.bincount(lists.entries)))
     entries = len(lists.entries)
     streams = (  # of a primitive, what the first warp of a block fetches: the others find it in L2
         Stream("tile_lists", "load", SECTOR_BYTES * entries, 4 * entries),
