@@ -21,7 +21,7 @@ SECTOR_BYTES = 32
 CHUNK_BYTES = 32  # granularity of Launch.atomic_requests
 
 
-@kernel
+@kernel(lent=True)
 def count_atomics(addresses: Any, lanes: int, merge: int) -> tuple[int, int, int, int]:
     """Active lanes, requests, conflicts and depth of one atomic instruction.
 
@@ -56,28 +56,28 @@ def count_atomics(addresses: Any, lanes: int, merge: int) -> tuple[int, int, int
     return active, merged, conflicts, depth
 
 
-@kernel
+@kernel(lent=True)
 def requests(addresses: Any, lanes: int, merge: int) -> int:
     """Count the requests of one atomic instruction after merging."""
     count: int = count_atomics(addresses, lanes, merge)[1]
     return count
 
 
-@kernel
+@kernel(lent=True)
 def conflicts(addresses: Any, lanes: int) -> int:
     """Count the lanes at an address that an earlier lane has."""
     count: int = count_atomics(addresses, lanes, 0)[2]
     return count
 
 
-@kernel
+@kernel(lent=True)
 def depth(addresses: Any, lanes: int) -> int:
     """Count the lanes at the most wanted address."""
     crowd: int = count_atomics(addresses, lanes, 0)[3]
     return crowd
 
 
-@kernel
+@kernel(lent=True)
 def add_requests(addresses: Any, lanes: int, merge: int, base: int, chunks: Any) -> None:
     """Add the requests of one instruction to a table by 32-byte chunk: who queues where.
 
@@ -100,7 +100,7 @@ def add_requests(addresses: Any, lanes: int, merge: int, base: int, chunks: Any)
         chunks[(addresses[i] - base) >> 5] += busiest
 
 
-@kernel
+@kernel(lent=True)
 def _sector_requests(addresses: Any, lanes: int) -> int:
     """Sum, over the sectors touched, the lanes at their most wanted address."""
     total = 0
@@ -112,7 +112,7 @@ def _sector_requests(addresses: Any, lanes: int) -> int:
     return total
 
 
-@kernel
+@kernel(lent=True)
 def _sector(addresses: Any, first: int, lanes: int, served: int) -> tuple[int, int]:
     """Mark the lanes in the sector of lane ``first`` as served; count those at its most wanted address."""
     most = 1

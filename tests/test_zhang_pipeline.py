@@ -21,7 +21,7 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.scenes.textured_mesh import geometry
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS
-from tilestamp.simulator.stages.zhang2025.fine_tile import quad_mask
+from tilestamp.simulator.stages.zhang2025.fine_tile import live_quads
 from tilestamp.simulator.stages.zhang2025.pixel_shader_block import quad_coordinates
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles, primitive_compaction
@@ -171,8 +171,8 @@ def test_hi_z_rejects_nothing_visible(matrix):
 
 
 def test_a_quad_is_live_if_one_pixel_is():
-    assert quad_mask(np.uint64(1) << np.uint64(63)) == 1 << 15
-    assert quad_mask(np.uint64(0x0101)) == 1
+    assert live_quads(np.uint64(1) << np.uint64(63)) == 1 << 54
+    assert live_quads(np.uint64(0x0101)) == 1
 
 
 def test_every_covered_fragment_is_shaded_in_a_quad(scene, matrix):

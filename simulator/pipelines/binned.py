@@ -159,7 +159,7 @@ def binned(
         image,
         pixels.depth[::-1],
         execute.works,
-        triangle_ids=np.where(pixels.winners >= 0, mesh.ids[pixels.winners], -1).astype(np.int32)[::-1],
+        triangle_ids=np.append(mesh.ids, np.int32(-1))[pixels.winners][::-1],  # the last one where there is none
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
         facts=facts,
         warnings=remarks(REMARKS, facts),

@@ -97,7 +97,7 @@ def _stored(level: NDArray[np.float32], tile: int) -> NDArray[np.float32]:
     return padded.reshape(rows, tile, columns, tile, 4).swapaxes(1, 2).reshape(-1, 4)
 
 
-@kernel
+@kernel(lent=True)
 def texel_index(chains: TextureChains, texture: int, level: int, x: int, y: int) -> Any:
     """Where texel (x, y) of a level lies, in texels; x and y wrap."""
     first = chains.levels[texture, level, 0]
@@ -111,7 +111,7 @@ def texel_index(chains: TextureChains, texture: int, level: int, x: int, y: int)
     return first + tile * side * side + (y % side) * side + x % side
 
 
-@kernel
+@kernel(lent=True)
 def nearest(chains: TextureChains, texture: int, u: Any, v: Any, out: Any) -> None:
     """Write the RGBA of the texel that (u, v) falls into, level 0, to ``out``."""
     x = int(np.floor(u * np.float32(chains.levels[texture, 0, 1])))
@@ -121,7 +121,7 @@ def nearest(chains: TextureChains, texture: int, u: Any, v: Any, out: Any) -> No
         out[c] = chains.texels[i, c]
 
 
-@kernel
+@kernel(lent=True)
 def footprint(chains: TextureChains, texture: int, level: int, u: Any, v: Any) -> tuple[int, int, Any, Any]:
     """Lower left texel of the 2x2 texels around (u, v), and the weights of the right and upper ones."""
     s = u * np.float32(chains.levels[texture, level, 1]) - _HALF
@@ -131,7 +131,7 @@ def footprint(chains: TextureChains, texture: int, level: int, u: Any, v: Any) -
     return int(x), int(y), s - x, t - y
 
 
-@kernel
+@kernel(lent=True)
 def add_bilinear(chains: TextureChains, texture: int, level: int, u: Any, v: Any, weight: Any, out: Any) -> None:
     """Add ``weight`` times the bilinear value at (u, v) of one level to ``out``."""
     x, y, fx, fy = footprint(chains, texture, level, u, v)
@@ -144,7 +144,7 @@ def add_bilinear(chains: TextureChains, texture: int, level: int, u: Any, v: Any
                 out[c] += w * chains.texels[i, c]
 
 
-@kernel
+@kernel(lent=True)
 def texel_step(chains: TextureChains, texture: int, dudx: Any, dvdx: Any, dudy: Any, dvdy: Any) -> Any:
     """Square of the longer of the two derivatives, in texels of the first level."""
     width = np.float32(chains.levels[texture, 0, 1])
@@ -154,7 +154,7 @@ def texel_step(chains: TextureChains, texture: int, dudx: Any, dvdx: Any, dudy: 
     return max(along_x, along_y)
 
 
-@kernel
+@kernel(lent=True)
 def level_of_detail(chains: TextureChains, texture: int, step: Any) -> Any:
     """Automatic level of a squared ``texel_step``: its log2 / 2, in [0, last level]."""
     if not step > _ONE:
@@ -162,7 +162,7 @@ def level_of_detail(chains: TextureChains, texture: int, step: Any) -> Any:
     return min(_HALF * np.log2(step), np.float32(chains.counts[texture] - 1))
 
 
-@kernel
+@kernel(lent=True)
 def add_trilinear(chains: TextureChains, texture: int, lod: Any, u: Any, v: Any, out: Any) -> None:
     """Add the trilinear value at (u, v): two levels around ``lod``, blended by its fraction."""
     low = int(lod)

@@ -52,18 +52,21 @@ def geometry(scene: Scene) -> Geometry:
     if mesh is None or len(mesh.triangles) == 0:
         raise TilestampError(f"the scene {scene.name} has no triangles, which the textured pipelines draw")
     count = len(mesh.positions)
-    finite = np.asarray(np.isfinite(mesh.positions).all(axis=1))
-    ids = np.flatnonzero(finite[mesh.triangles].all(axis=1)).astype(np.int32)
-    triangles = mesh.triangles[ids]
-    positions = np.where(finite[:, None], mesh.positions, np.float32(0.0))
+    positions, triangles, ids = mesh.positions, mesh.triangles, np.arange(len(mesh.triangles), dtype=np.int32)
+    if not np.isfinite(positions).all():
+        finite = np.asarray(np.isfinite(positions).all(axis=1))
+        ids = np.flatnonzero(finite[triangles].all(axis=1)).astype(np.int32)
+        triangles = triangles[ids]
+        positions = np.where(finite[:, None], positions, np.float32(0.0))
     colors = np.ones((count, 4), np.float32) if mesh.colors is None else mesh.colors
     normals = vertex_normals(positions, triangles) if mesh.normals is None else mesh.normals
     uvs = np.zeros((count, 2), np.float32) if mesh.uvs is None else mesh.uvs
     textures = np.full(len(ids), -1, np.int32)
     if mesh.texture_ids is not None and mesh.uvs is not None:
-        known = np.asarray(np.isfinite(uvs).all(axis=1))
-        mapped = known[triangles].all(axis=1)
-        textures = np.where(mapped, mesh.texture_ids[ids], np.int32(-1)).astype(np.int32)
+        textures = mesh.texture_ids[ids].astype(np.int32)
+        if not np.isfinite(uvs).all():
+            known = np.asarray(np.isfinite(uvs).all(axis=1))
+            textures[~known[triangles].all(axis=1)] = -1
     return Geometry(positions, triangles, _clean(colors), _clean(normals), _clean(uvs), textures, ids)
 
 
@@ -93,4 +96,6 @@ def draws(scene: Scene, mesh: Geometry) -> NDArray[np.int64]:
 
 def _clean(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Put 0 for what is not finite."""
+    if values.dtype == np.float32 and np.isfinite(values).all():
+        return values
     return np.nan_to_num(values, posinf=0.0, neginf=0.0).astype(np.float32)

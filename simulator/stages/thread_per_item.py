@@ -13,7 +13,7 @@ from tilestamp.simulator.work import Work
 
 
 class ThreadEvent(IntEnum):
-    """Events of one block."""
+    """Events of one block, in the order in which ``thread_per_item`` writes them."""
 
     WARPS = 0  # warps that run the body
     WARP_LANES = 1  # their lanes that have an item
@@ -82,30 +82,28 @@ def thread_per_item(
         One row a block.
     """
     blocks = max(1, -(-items // block))
-    lanes = np.full(blocks, block, np.int64)
-    lanes[-1] = items - (blocks - 1) * block
-    warps = -(-lanes // simt.warp)
-    table = np.zeros((blocks, len(ThreadEvent)), np.int64)
-    table[:, ThreadEvent.WARPS] = warps
-    table[:, ThreadEvent.WARP_LANES] = lanes
-    table[:, ThreadEvent.BLOCKS] = 1
-    table[:, ThreadEvent.IDLE_WARPS] = -(-block // simt.warp) - warps
+    most = -(-block // simt.warp)  # warps of a block
+    lanes = block, items - (blocks - 1) * block  # of a full block, and of the last one
+    warps = most, -(-lanes[1] // simt.warp)
+    launched = (blocks - 1) * most + warps[1]
+    moving = [0] * 4  # transactions, then bytes, of a warp's loads and stores
     streams = []
     moves: tuple[tuple[Literal["load", "store"], tuple[Access, ...]], ...] = (("load", loads), ("store", stores))
     for op, accesses in moves:
         for access in accesses:
-            count, size = record_transactions(access, simt)
-            table[:, ThreadEvent[f"{op.upper()}_TRANSACTIONS"]] += warps * count
-            table[:, ThreadEvent[f"{op.upper()}_BYTES"]] += warps * size
+            count, size = record_transactions(access._replace(buffer=""), simt)
+            moving[op == "store"] += count
+            moving[2 + (op == "store")] += size
             footprint = items * access.stride
-            moved = int(warps.sum()) * size
+            moved = launched * size
             if not access.scattered:
                 moved = min(moved, max(footprint, items * access.words * access.word_bytes))
-            lines = partial_lines(access, simt.warp) if op == "store" else 0
-            streams.append(Stream(access.buffer, op, moved, footprint, partial_lines=lines * int(warps.sum())))
-    idle = np.zeros((idle_blocks, len(ThreadEvent)), np.int64)
-    idle[:, ThreadEvent.IDLE_WARPS] = -(-block // simt.warp)
-    table = np.concatenate([table, idle])
+            lines = partial_lines(access._replace(buffer=""), simt.warp) if op == "store" else 0
+            streams.append(Stream(access.buffer, op, moved, footprint, partial_lines=lines * launched))
+    rows = [[warps[i], lanes[i], *(warps[i] * moved for moved in moving), 1, most - warps[i]] for i in range(2)]
+    table = np.empty((blocks + idle_blocks, len(ThreadEvent)), np.int64)
+    table[: blocks - 1], table[blocks - 1] = rows
+    table[blocks:] = [0] * ThreadEvent.IDLE_WARPS + [most]
     return Work(
         stage=stage,
         kernel=kernel,
@@ -130,10 +128,11 @@ def record_transactions(access: Access, simt: Simt) -> tuple[int, int]:
     return count, total
 
 
+@cache
 def partial_lines(access: Access, warp: int) -> int:
     """Lines that the memory instructions of a whole warp on consecutive records fill in part."""
     if access.stride == access.word_bytes:
         return 0
     lanes = np.arange(warp, dtype=np.int64)[:, None] * access.stride
     lines = (lanes + np.arange(access.words) * access.word_bytes) // LINE_BYTES
-    return sum(len(np.unique(word)) for word in lines.T)
+    return access.words + int(np.count_nonzero(np.diff(lines, axis=0)))

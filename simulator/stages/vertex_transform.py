@@ -16,7 +16,7 @@ AMBIENT = np.float32(0.2)
 _PART_VERTICES = 4096  # at least
 
 
-@kernel
+@kernel(lent=True)
 def _transform_part(part: int, parts: int, positions: Any, matrix: Any, out: Any) -> None:
     for v in range(positions.shape[0] * part // parts, positions.shape[0] * (part + 1) // parts):
         for c in range(4):
@@ -26,7 +26,7 @@ def _transform_part(part: int, parts: int, positions: Any, matrix: Any, out: Any
             out[v, c] = value
 
 
-@kernel
+@kernel(lent=True)
 def _add_normals(positions: Any, triangles: Any, normals: Any) -> None:
     """Add each triangle's normal, as long as its area, to its vertices."""
     for t in range(triangles.shape[0]):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN, centroid_sample, sample_mask
-from tilestamp.simulator.stages.laine2011.exact import lowest_bit, popcount
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,

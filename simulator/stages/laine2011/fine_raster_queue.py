@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tilestamp.models.bits import popcount
 from tilestamp.models.coalescing import contiguous, smallest_transaction_bytes, transactions
 from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
-from tilestamp.simulator.stages.laine2011.exact import popcount
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS

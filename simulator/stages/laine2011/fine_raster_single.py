@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import lowest_bit
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.exact import lowest_bit
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import popcount
 from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stages.laine2011.exact import popcount
 from tilestamp.simulator.stages.laine2011.subtriangle import (
     ABSENT,
     BACKFACE,

@@ -56,7 +56,7 @@ def noise() -> NDArray[np.float32]:
     return np.stack([np.cos(2.0 * np.pi * order), np.sin(2.0 * np.pi * order)], axis=2).astype(np.float32)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _occluded(
     w: Any, normal: Any, turn: Any, samples: Any, scales: Any, shift: Any, x: int, y: int, radius: Any
 ) -> int:
@@ -89,7 +89,7 @@ def _occluded(
     return occluded
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _row(
     w: Any, normals: Any, turns: Any, samples: Any, scales: Any, shift: Any, relative: Any, y: int, light: Any
 ) -> None:
@@ -101,7 +101,7 @@ def _row(
             light[y, x] = _ONE - np.float32(found) / np.float32(len(samples))
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _ambient_occlusion(
     part: int, parts: int, w: Any, normals: Any, turns: Any, samples: Any, scales: Any, shift: Any, relative: Any,
     light: Any,

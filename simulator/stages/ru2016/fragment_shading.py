@@ -52,7 +52,7 @@ class Fragments(NamedTuple):
     w: NDArray[np.float32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: bool) -> tuple[Any, Any, Any, Any]:
     """Weights of a triangle's corners at a point of the screen, and the interpolated w."""
     x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
@@ -65,7 +65,7 @@ def weights(screen: Any, triangles: Any, t: int, px: Any, py: Any, perspective: 
     return a, b, c, w
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _interpolate_row(
     screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any, visible: Any, y: int,
     perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -91,7 +91,7 @@ def _interpolate_row(
         depths[y, x] = w
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _interpolate(
     part: int, parts: int, screen: Any, triangles: Any, vertex_uvs: Any, vertex_normals: Any, vertex_colors: Any,
     visible: Any, perspective: bool, uvs: Any, normals: Any, colors: Any, depths: Any,
@@ -148,7 +148,7 @@ def _shade_row(
             out[y, x, c] = np.uint8(min(max(value, _ZERO), _ONE) * np.float32(255.0) + _HALF)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _shade(
     part: int, parts: int, visible: Any, texture_ids: Any, chains: Any, bilinear: bool, uvs: Any, normals: Any,
     colors: Any, light: Any, out: Any,

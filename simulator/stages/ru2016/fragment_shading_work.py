@@ -174,7 +174,7 @@ def _count_rows(part: int, parts: int, drawn: Any, texel: Any, texels: Any, coun
             row[_ZERO_LANES] += zero[c]
 
 
-@kernel
+@kernel(lent=True)
 def _is_new(line: int, lines: Any, known: int, touched: Any) -> bool:
     """Whether a line is none of the warp's first ``known``; it then is the next."""
     for i in range(known - 1, -1, -1):

@@ -44,7 +44,7 @@ class OcclusionBlurEvent(IntEnum):
     STORE_BYTES = 8
 
 
-@kernel
+@kernel(lent=True)
 def _blur_rows(part: int, parts: int, light: Any, out: Any) -> None:
     """Mean over the window of a share of the rows, as far as it lies in the picture."""
     height, width = light.shape

@@ -10,7 +10,6 @@ import numpy as np
 
 from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.ru2016.per_primitive_warps import BLOCK, PerPrimitiveEvent
 from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, border_box, corners, inside
 
@@ -29,7 +28,7 @@ _ONE = np.float32(1.0)
 _ZERO = np.float32(0.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events: Any) -> None:
     """All waves of resident warps.
 
@@ -42,7 +41,7 @@ def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events:
     warps : Walkers
     buffers : tuple
         Nearest triangle, depth, triangle of the fragment that landed last, its round, atomic requests.
-    events : ndarray or None
+    events : ndarray
     """
     resident, warp = warps.boxes.shape[:2]
     total = (len(mesh[2]) + warp - 1) // warp
@@ -51,21 +50,21 @@ def walk(mesh: Any, culling: bool, merge: int, warps: Any, buffers: Any, events:
         end = min(total, first + resident)
         warps.boxes[:] = 0
         warps.seen[:] = 0
-        rounds = _wave(borrow(mesh), first, end, culling, merge, warps, borrow(buffers), rounds, borrow(events))
+        rounds = _wave(mesh, first, end, culling, merge, warps, buffers, rounds, events)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _wave(
     mesh: Any, first: int, end: int, culling: bool, merge: int, warps: Any, buffers: Any, rounds: int, events: Any
 ) -> Any:
     """Run the resident warps first..end-1 to their ends; returns the round after the last."""
-    boxes, shapes, steps, seen, pixels, who, wins = borrow(warps)
+    boxes, shapes, steps, seen, pixels, who, wins = warps
     nearest, depth, raced, landed, requests = buffers
     textured = mesh[4]
     warp = len(pixels)
     count = end - first
     for w in range(count):
-        row = row_of(events, (first + w) * warp // BLOCK)
+        row = events[(first + w) * warp // BLOCK]
         steps[w] = _boxes(*mesh[:4], (first + w) * warp, depth.shape, culling, boxes[w], shapes[w], row)
     s = 0
     busy = True
@@ -75,7 +74,7 @@ def _wave(
             if s >= steps[w]:  # at its end
                 continue
             busy = True
-            row = row_of(events, (first + w) * warp // BLOCK)
+            row = events[(first + w) * warp // BLOCK]
             hits, columns = _step(shapes[w], boxes[w], nearest, depth, pixels, who, wins, row)
             seen[w, 0] += 1
             seen[w, 4] += min(columns, 1)
@@ -86,19 +85,17 @@ def _wave(
                 written, mapped = _write(boxes, w, pixels[:hits], who, wins, textured, raced, landed, lands, row)
                 seen[w, 2] += min(written, 1)
                 seen[w, 3] += min(mapped, 1)
-                if events is not None:
-                    _count_atomics(pixels[:hits], merge, row, requests)
+                _count_atomics(pixels[:hits], merge, row, requests)
         s += 1
-    if events is not None:
-        for w in range(count):
-            row = events[(first + w) * warp // BLOCK]
-            row[PerPrimitiveEvent.BOX_STEPS] += seen[w, 0]
-            for k in range(len(LONGEST)):
-                row[LONGEST[k]] = max(row[LONGEST[k]], seen[w, k])
+    for w in range(count):
+        row = events[(first + w) * warp // BLOCK]
+        row[PerPrimitiveEvent.BOX_STEPS] += seen[w, 0]
+        for k in range(len(LONGEST)):
+            row[LONGEST[k]] = max(row[LONGEST[k]], seen[w, k])
     return rounds + s
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _boxes(
     screen: Any, triangles: Any, drawable: Any, shift: Any, first: int, shape: Any, culling: bool, boxes: Any,
     shapes: Any, row: Any,
@@ -114,12 +111,10 @@ def _boxes(
             break
         t = drawable[first + lane]
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
-        if row is not None:
-            row[PerPrimitiveEvent.WARP_LANES] += 1
+        row[PerPrimitiveEvent.WARP_LANES] += 1
         size = area(x0, y0, x1, y1, x2, y2)
         if (culling and size <= _ZERO) or size == _ZERO:
-            if row is not None:
-                row[PerPrimitiveEvent.CULLED] += 1
+            row[PerPrimitiveEvent.CULLED] += 1
             continue
         front += 1
         left, right, top, bottom = border_box(
@@ -136,14 +131,13 @@ def _boxes(
             shapes[lane, 2 * k + 1] = screen[triangles[t, k], 1]
             shapes[lane, 7 + k] = screen[triangles[t, k], 2]
         shapes[lane, 6] = _ONE / size
-    if row is not None:
-        row[PerPrimitiveEvent.WARPS] += 1
-        row[PerPrimitiveEvent.FRONT_WARPS] += min(front, 1)
-        row[PerPrimitiveEvent.FRONT_LANES] += front
+    row[PerPrimitiveEvent.WARPS] += 1
+    row[PerPrimitiveEvent.FRONT_WARPS] += min(front, 1)
+    row[PerPrimitiveEvent.FRONT_LANES] += front
     return most
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _step(
     shapes: Any, boxes: Any, nearest: Any, depth: Any, pixels: Any, who: Any, wins: Any, row: Any
 ) -> tuple[int, int]:
@@ -182,15 +176,14 @@ def _step(
             depth[y, x] = value
             nearest[y, x] = boxes[lane, 4]
         hits += 1
-    if row is not None:
-        row[PerPrimitiveEvent.SAMPLE_TESTS] += tests
-        row[PerPrimitiveEvent.SAMPLE_HITS] += hits
-        row[PerPrimitiveEvent.COLUMN_STEPS] += min(columns, 1)
-        row[PerPrimitiveEvent.COLUMN_LANES] += columns
+    row[PerPrimitiveEvent.SAMPLE_TESTS] += tests
+    row[PerPrimitiveEvent.SAMPLE_HITS] += hits
+    row[PerPrimitiveEvent.COLUMN_STEPS] += min(columns, 1)
+    row[PerPrimitiveEvent.COLUMN_LANES] += columns
     return hits, columns
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _write(
     boxes: Any, w: int, pixels: Any, who: Any, wins: Any, textured: Any, raced: Any, landed: Any, lands: int, row: Any
 ) -> tuple[int, int]:
@@ -211,15 +204,14 @@ def _write(
         if lands >= landed[y, x]:
             landed[y, x] = lands
             raced[y, x] = t
-    if row is not None:
-        row[PerPrimitiveEvent.WRITES] += min(written, 1)
-        row[PerPrimitiveEvent.WRITE_LANES] += written
-        row[PerPrimitiveEvent.TEXTURED_WRITES] += min(mapped, 1)
-        row[PerPrimitiveEvent.TEXTURED_LANES] += mapped
+    row[PerPrimitiveEvent.WRITES] += min(written, 1)
+    row[PerPrimitiveEvent.WRITE_LANES] += written
+    row[PerPrimitiveEvent.TEXTURED_WRITES] += min(mapped, 1)
+    row[PerPrimitiveEvent.TEXTURED_LANES] += mapped
     return written, mapped
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _count_atomics(pixels: Any, merge: int, row: Any, requests: Any) -> None:
     for i in range(len(pixels)):
         pixels[i] *= 4  # bytes

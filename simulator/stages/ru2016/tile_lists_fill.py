@@ -12,14 +12,13 @@ import numpy as np
 from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.ru2016.tile_lists_warps import BLOCK, COUNTER_WORD, SEPARATED_BY_NONE, TileListEvent
 from tilestamp.simulator.stages.ru2016.triangle import area, corners, pixel_box
 
 _ZERO = np.float32(0.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def edges_tried(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> int:
     """Edges of a triangle that are tried until one separates it from a square tile (touching does not).
 
@@ -38,13 +37,13 @@ def edges_tried(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any,
     return 3 if _separates(x2, y2, x0, y0, x1, y1, left, top, right, bottom) else SEPARATED_BY_NONE
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def overlaps(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, left: Any, top: Any, size: Any) -> Any:
     """Whether a triangle and a square tile overlap: no axis of five separates them."""
     return edges_tried(x0, y0, x1, y1, x2, y2, left, top, size) == SEPARATED_BY_NONE
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _separates(
     ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, left: Any, top: Any, right: Any, bottom: Any
 ) -> Any:
@@ -59,7 +58,7 @@ def _separates(
     return farthest < min(third, _ZERO) or nearest > max(third, _ZERO)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def count_entries(part: int, parts: int, mesh: Any, frame: Any, sizes: Any) -> None:
     """Count the entries of each tile's list, of a share of the triangles in a row of ``sizes``; their order is free."""
     screen, triangles, drawable = mesh
@@ -79,7 +78,7 @@ def count_entries(part: int, parts: int, mesh: Any, frame: Any, sizes: Any) -> N
                     sizes[part, line * across + column] += 1
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def fill(
     mesh: Any, frame: Any, rules: Any, walkers: Any, room: int, limits: Any, sizes: Any, entries: Any, requests: Any,
     events: Any,
@@ -106,19 +105,19 @@ def fill(
         count = min(total, first + resident) - first
         for w in range(count):
             row = events[(first + w) * warp // BLOCK]
-            rows = _boxes(borrow(mesh), (first + w) * warp, borrow(frame), walkers.boxes[w], row)
+            rows = _boxes(mesh, (first + w) * warp, frame, walkers.boxes[w], row)
             walkers.place[w, :] = 0
             walkers.place[w, 3] = rows
             if rows > 0:
                 _begin_row(walkers.boxes[w], walkers.place[w], row)
         lost += _rounds(
-            borrow(mesh), borrow(frame), rules, borrow(walkers), first, count, room,
-            (borrow(limits), borrow(sizes), borrow(entries), borrow(requests)), borrow(events),
+            mesh, frame, rules, walkers, first, count, room,
+            (limits, sizes, entries, requests), events,
         )  # fmt: skip
     return lost
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _rounds(
     mesh: Any, frame: Any, rules: Any, walkers: Any, first: int, count: int, room: int, lists: Any, events: Any
 ) -> int:
@@ -160,7 +159,7 @@ def _rounds(
     return lost
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _begin_row(boxes: Any, place: Any, row: Any) -> None:
     """Find the steps of a warp over a row of its lanes' boxes: those of the widest that has the row."""
     columns = 0
@@ -177,7 +176,7 @@ def _begin_row(boxes: Any, place: Any, row: Any) -> None:
     row[TileListEvent.BOX_LANES] += tiles
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _append(
     mesh: Any, frame: Any, boxes: Any, place: Any, room: int, limits: Any, sizes: Any, entries: Any,
     addresses: Any, places: Any, row: Any,
@@ -223,7 +222,7 @@ def _append(
     return appended, lost
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _boxes(mesh: Any, first: int, frame: Any, boxes: Any, row: Any) -> int:
     """Cull, and find each lane's box of tiles; returns the most rows of a lane."""
     screen, triangles, drawable = mesh
@@ -257,7 +256,7 @@ def _boxes(mesh: Any, first: int, frame: Any, boxes: Any, row: Any) -> int:
     return most
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _count_append(addresses: Any, places: Any, warp: int, rules: Any, row: Any, requests: Any) -> None:
     """Count one warp's atomicAdd on the counters and the stores of the entries."""
     lanes, merged, conflicts, depth = count_atomics(addresses, warp, rules[1])

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
 from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
@@ -77,43 +78,53 @@ class Visible(NamedTuple):
     depth: NDArray[np.float32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
+def _hits(
+    x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, inverse: Any, x_first: int, columns: int, py: Any
+) -> Any:
+    """Pixels of a row that lie in a triangle, the first at the lowest bit of a uint64."""
+    hits = 0
+    for x in range(columns):
+        px = np.float32(x_first + x) + _HALF
+        a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, px, py)
+        hits |= (1 if inside(a, b, c) else 0) << x
+    return np.uint64(hits)
+
+
+@kernel(error_model="numpy", lent=True)
 def _tile(
     screen: Any, triangles: Any, entries: Any, x_first: int, y_first: int, tile: int, warp: int,
     visible: Any, depth: Any, marks: Any, row: Any,
 ) -> None:  # fmt: skip
     """Rasterize one tile's list; ``marks``, (4, warps): who hits and who comes nearer now, and how often so far."""
     height, width = depth.shape
+    columns = min(tile, width - x_first)
     for t in entries:
         x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
         inverse = _ONE / area(x0, y0, x1, y1, x2, y2)
         z0, z1, z2 = screen[triangles[t, 0], 2], screen[triangles[t, 1], 2], screen[triangles[t, 2], 2]
-        for y in range(tile):
+        for y in range(min(tile, height - y_first)):
             py = np.float32(y_first + y) + _HALF
-            for x in range(tile):
-                px = np.float32(x_first + x) + _HALF
-                a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, px, py)
-                if not inside(a, b, c) or x_first + x >= width or y_first + y >= height:
-                    continue
+            hits = _hits(x0, y0, x1, y1, x2, y2, inverse, x_first, columns, py)
+            row[TiledRasterEvent.SAMPLE_HITS] += popcount(hits)
+            while hits != np.uint64(0):
+                column = lowest_bit(hits)
+                hits &= hits - np.uint64(1)
+                x, w = x_first + column, (y * tile + column) // warp
+                a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, np.float32(x) + _HALF, py)
                 z = a * z0 + b * z1 + c * z2
-                nearer = z >= _ZERO and z < depth[y_first + y, x_first + x]
-                if nearer:
-                    depth[y_first + y, x_first + x] = z
-                    visible[y_first + y, x_first + x] = t
-                if row is not None:
-                    w = (y * tile + x) // warp
-                    row[TiledRasterEvent.SAMPLE_HITS] += 1
-                    marks[0, w] = 1
-                    if nearer:
-                        row[TiledRasterEvent.NEARER_LANES] += 1
-                        marks[1, w] = 1
-        if row is not None:
-            for w in range(marks.shape[1]):
-                row[TiledRasterEvent.HIT_WARPS] += marks[0, w]
-                row[TiledRasterEvent.NEARER_WARPS] += marks[1, w]
-                for k in range(2):
-                    marks[2 + k, w] += marks[k, w]
-                    marks[k, w] = 0
+                marks[0, w] = 1
+                if z >= _ZERO and z < depth[y_first + y, x]:
+                    depth[y_first + y, x] = z
+                    visible[y_first + y, x] = t
+                    row[TiledRasterEvent.NEARER_LANES] += 1
+                    marks[1, w] = 1
+        for w in range(marks.shape[1]):
+            row[TiledRasterEvent.HIT_WARPS] += marks[0, w]
+            row[TiledRasterEvent.NEARER_WARPS] += marks[1, w]
+            for k in range(2):
+                marks[2 + k, w] += marks[k, w]
+                marks[k, w] = 0
 
 
 @kernel(error_model="numpy")
@@ -128,23 +139,22 @@ def _band(
     for column in range(columns):
         i = tile_row * columns + column
         listed = entries[starts[i] : starts[i + 1]]
-        row = None if events is None else events[i]
+        row = events[i]
         _tile(screen, triangles, listed, column * tile, tile_row * tile, tile, warp, visible, depth, marks, row)
-        if events is not None:
-            events[i, TiledRasterEvent.WARPS] = warps
-            events[i, TiledRasterEvent.WARP_LANES] = tile * tile
-            events[i, TiledRasterEvent.TEST_WARPS] = warps * len(listed)
-            events[i, TiledRasterEvent.SAMPLE_TESTS] = tile * tile * len(listed)
-            events[i, TiledRasterEvent.ENTRIES] = len(listed)
-            events[i, TiledRasterEvent.BLOCKS] = 1
-            events[i, TiledRasterEvent.LISTED_WARPS] = warps * min(len(listed), 1)
-            events[i, TiledRasterEvent.LISTED_LANES] = tile * tile * min(len(listed), 1)
-            events[i, TiledRasterEvent.LONGEST_HITS] = marks[2].max()
-            events[i, TiledRasterEvent.LONGEST_NEARER] = marks[3].max()
-            marks[:] = 0
+        row[TiledRasterEvent.WARPS] = warps
+        row[TiledRasterEvent.WARP_LANES] = tile * tile
+        row[TiledRasterEvent.TEST_WARPS] = warps * len(listed)
+        row[TiledRasterEvent.SAMPLE_TESTS] = tile * tile * len(listed)
+        row[TiledRasterEvent.ENTRIES] = len(listed)
+        row[TiledRasterEvent.BLOCKS] = 1
+        row[TiledRasterEvent.LISTED_WARPS] = warps * min(len(listed), 1)
+        row[TiledRasterEvent.LISTED_LANES] = tile * tile * min(len(listed), 1)
+        row[TiledRasterEvent.LONGEST_HITS] = marks[2].max()
+        row[TiledRasterEvent.LONGEST_NEARER] = marks[3].max()
+        marks[:] = 0
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _tiled_raster(
     part: int, parts: int, screen: Any, triangles: Any, starts: Any, entries: Any, tile: int, warp: int,
     visible: Any, depth: Any, events: Any,
@@ -190,7 +200,7 @@ def tiled_raster(
     parts = parts_of(-(-height // tile))
     for_parts(_tiled_raster, parts, screen, triangles, *lists, tile, simt.warp, *visible, events)
     _add_traffic(events, simt, tile)
-    drawn = len(np.unique(lists.entries))
+    drawn = int(np.count_nonzero(np.bincount(lists.entries)))
     entries = len(lists.entries)
     streams = (  # of a primitive, what the first warp of a block fetches: the others find it in L2
         Stream("tile_lists", "load", SECTOR_BYTES * entries, 4 * entries),

@@ -10,20 +10,20 @@ _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def corners(screen: Any, triangles: Any, t: int) -> tuple[Any, Any, Any, Any, Any, Any]:
     """Screen coordinates of a triangle's corners: x0, y0, x1, y1, x2, y2."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     return screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1], screen[c, 0], screen[c, 1]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def area(x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any) -> Any:
     """Twice the signed area; positive where the corners run counter-clockwise on a screen whose y points down."""
     return (x2 - x0) * (y1 - y0) - (x1 - x0) * (y2 - y0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def barycentric(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, inverse: Any, px: Any, py: Any
 ) -> tuple[Any, Any, Any]:
@@ -33,19 +33,19 @@ def barycentric(
     return _ONE - b - c, b, c
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def inside(a: Any, b: Any, c: Any) -> Any:
     """Whether all three lie in [0, 1]: edges belong to both neighbours, as in the original."""
-    return a >= _ZERO and b >= _ZERO and c >= _ZERO and a <= _ONE and b <= _ONE and c <= _ONE
+    return (a >= _ZERO) & (b >= _ZERO) & (c >= _ZERO) & (a <= _ONE) & (b <= _ONE) & (c <= _ONE)  # in any number at once
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _column(coordinate: Any, size: int) -> int:
     """Column or row of a coordinate, the nearest border's where it lies outside."""
     return int(min(max(coordinate, _ZERO), np.float32(size - 1)))
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def border_box(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
 ) -> tuple[int, int, int, int]:
@@ -56,7 +56,7 @@ def border_box(
     )  # fmt: skip
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def pixel_box(
     x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, width: int, height: int
 ) -> tuple[int, int, int, int]:

@@ -81,7 +81,7 @@ def eye_space(matrix: NDArray[Any]) -> EyeSpace:
     return EyeSpace(axes.astype(np.float32), np.where(scales > 1e-12, scales, 0.0).astype(np.float32))
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _vertex_shading(
     positions: Any, normals: Any, matrix: Any, axes: Any, size: Any, shift: Any, screen: Any, eye_normals: Any
 ) -> None:

@@ -11,14 +11,14 @@ MOST_VERTICES = 12  # 9, since a triangle gains one for each plane; rounding of 
 _ZERO = np.float32(0.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def distance(vertex: Any, plane: int) -> Any:
     """How far a vertex (x, y, z, w, ...) is inside a plane: w + x, w - x, w + y, w - y, w + z, w - z."""
     axis = vertex[plane // 2]
     return vertex[3] + axis if plane % 2 == 0 else vertex[3] - axis
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def outcode(vertex: Any) -> int:
     """Bit p: the vertex is outside of plane p."""
     code = 0
@@ -28,7 +28,7 @@ def outcode(vertex: Any) -> int:
     return code
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def clip_polygon(polygon: Any, scratch: Any, count: int) -> int:
     """Clip ``polygon``, (12, n), in place; returns its vertices, 0 where nothing is left."""
     for plane in range(PLANES):
@@ -40,14 +40,17 @@ def clip_polygon(polygon: Any, scratch: Any, count: int) -> int:
             here = distance(polygon[i], plane)
             there = distance(polygon[j], plane)
             if here >= _ZERO:
-                scratch[kept] = polygon[i]
+                for k in range(polygon.shape[1]):
+                    scratch[kept, k] = polygon[i, k]
                 kept += 1
             if (here >= _ZERO) != (there >= _ZERO):
                 t = here / (here - there)
                 for k in range(polygon.shape[1]):
                     scratch[kept, k] = polygon[i, k] + t * (polygon[j, k] - polygon[i, k])
                 kept += 1
-        polygon[:kept] = scratch[:kept]
+        for i in range(kept):
+            for k in range(polygon.shape[1]):
+                polygon[i, k] = scratch[i, k]
         count = kept
         if count < 3:
             return 0

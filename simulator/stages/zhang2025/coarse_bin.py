@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.zhang2025.depth import NO_DEPTH, depth_24_bit
 from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN
@@ -63,7 +64,7 @@ class CoarseRasterizerEvent(IntEnum):
     CRITICAL_UPDATE_STEPS = 30  # of the warp of CRITICAL_HI_Z_STEPS: steps in which a lane lowers a tile's depth
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _corner(edge: Any, left: Any, bottom: Any, far: bool) -> Any:
     """Evaluate an edge function at the tile's corner that lies farthest inside, or farthest outside."""
     side = np.float32(TILE)
@@ -72,7 +73,7 @@ def _corner(edge: Any, left: Any, bottom: Any, far: bool) -> Any:
     return edge[0] * x + edge[1] * y + edge[2]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _depth_range(plane: Any, left: Any, bottom: Any) -> tuple[int, int]:
     """Least and greatest depth of a plane over a tile, in 24 bits."""
     side = np.float32(TILE)
@@ -81,22 +82,29 @@ def _depth_range(plane: Any, left: Any, bottom: Any) -> tuple[int, int]:
     return depth_24_bit(min(x0, x1) + min(y0, y1) + plane[2]), depth_24_bit(max(x0, x1) + max(y0, y1) + plane[2])
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _tile_of_warp(
     edges: Any, planes: Any, boxes: Any, listed: Any, left: Any, bottom: Any, cached: int, tile: int, margin: int,
-    masks: Any, row: Any,
+    warp: int, masks: Any, row: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """All lanes of a warp at one tile; sets their bits in ``masks``; returns how long they take and the new depth."""
+    """All lanes of a warp at one tile; sets its bit in ``masks``; returns how long they take and the new depth.
+
+    ``boxes`` (4, lanes) are of the warp's primitives, ``listed``.
+    """
     side = np.float32(TILE)
-    tested = passed = kept = updates = 0
-    lowered = NO_DEPTH
+    meets = 0  # bit i: the box of lane i meets the tile
     for lane in range(len(listed)):
+        beside = (boxes[0, lane] >= left + side) | (boxes[2, lane] <= left) | (boxes[0, lane] >= boxes[2, lane])
+        beside |= (boxes[1, lane] >= bottom + side) | (boxes[3, lane] <= bottom) | (boxes[1, lane] >= boxes[3, lane])
+        meets |= (0 if beside else 1) << lane
+    untested = np.uint64(meets)
+    tested = popcount(untested)
+    passed = kept = updates = 0
+    lowered = NO_DEPTH
+    while untested:
+        lane = lowest_bit(untested)
+        untested &= untested - np.uint64(1)
         p = listed[lane]
-        if max(boxes[p, 0], left) >= min(boxes[p, 2], left + side):
-            continue
-        if max(boxes[p, 1], bottom) >= min(boxes[p, 3], bottom + side):
-            continue
-        tested += 1
         outside = False
         covers = True
         for k in range(3):
@@ -112,7 +120,7 @@ def _tile_of_warp(
         if covers:
             updates += 1
             lowered = min(lowered, high)
-        masks[tile, lane] = True
+        masks[lane, tile // warp] |= np.uint64(1) << np.uint64(tile % warp)
     row[CoarseRasterizerEvent.EDGE_STEPS] += tested > 0
     row[CoarseRasterizerEvent.EDGE_LANES] += tested
     row[CoarseRasterizerEvent.HI_Z_STEPS] += passed > 0
@@ -126,99 +134,151 @@ def _tile_of_warp(
     return _TESTED * (passed > 0) + _KEPT * (kept > 0) + (_UPDATED + _LANE * updates) * (updates > 0), lowered
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
+def _next_tile(span: Any, tile: int) -> int:
+    """Find the first tile from ``tile`` on that a warp's boxes span; ``TILES`` where there is none."""
+    x, y = tile % TILES_A_ROW, tile // TILES_A_ROW
+    if x > span[2]:
+        x, y = 0, y + 1
+    if y < span[1]:
+        x, y = 0, span[1]
+    return max(x, span[0]) + y * TILES_A_ROW if y <= span[3] and span[0] <= span[2] else TILES
+
+
+@kernel(error_model="numpy", lent=True)
 def _test_round(
     edges: Any, planes: Any, boxes: Any, listed: Any, origin_x: int, origin_y: int, warp: int, margin: int, hi_z: Any,
-    masks: Any, row: Any,
+    masks: Any, walk: Any, row: Any,
 ) -> None:  # fmt: skip
-    """Walk the tiles with all warps of a round, always the one that is behind; sets ``masks`` (256, primitives)."""
-    warps = -(-len(listed) // warp)
-    clock, following, steps = np.zeros(warps, np.int64), np.zeros(warps, np.int64), np.zeros((warps, 2), np.int64)
-    longest = 0
-    lowered = np.full(warps, NO_DEPTH, np.int64)  # by a warp that still is at its last tile
-    spans = np.empty((warps, 4), np.int64)
+    """Walk the tiles with all warps of a round, always the one that is behind; sets ``masks``.
+
+    Tiles at which a warp neither tests a box nor lowers the depth of the one before take it ``_TILE`` cycles each and
+    do nothing else: they are passed over.
+    """
+    clock, following, taken, lowered, arrival, spans, steps = walk
+    warps = (len(listed) + warp - 1) // warp
     for w in range(warps):
-        spans[w] = _tiles_of(boxes, listed[w * warp : (w + 1) * warp], origin_x, origin_y)
-    for _ in range(warps * TILES):
-        w = int(clock.argmin())
+        _tiles_of(boxes[:, w * warp : min((w + 1) * warp, len(listed))], origin_x, origin_y, spans[w])
+        following[w] = _next_tile(spans[w], 0)
+        clock[w] = following[w] * _TILE if following[w] < TILES else _ARRIVED
+        taken[w] = steps[w, 0] = steps[w, 1] = 0
+        lowered[w] = NO_DEPTH  # by a warp that still is at its last tile
+        arrival[w] = (TILES - 1) * _TILE  # at the last tile
+    while True:
+        w = 0
+        for other in range(1, warps):
+            w = other if clock[other] < clock[w] else w
+        if clock[w] == _ARRIVED:
+            break
         tile = following[w]
         hi_z[tile - 1] = min(hi_z[tile - 1], lowered[w])
         lowered[w] = NO_DEPTH
-        x, y = tile % TILES_A_ROW, tile // TILES_A_ROW
-        low_x, low_y, high_x, high_y = spans[w]
-        clock[w] += _TILE
-        if low_x <= x <= high_x and low_y <= y <= high_y:
+        if _next_tile(spans[w], tile) == tile:
             before = row[CoarseRasterizerEvent.HI_Z_STEPS]
-            left, bottom = np.float32(origin_x + x * TILE), np.float32(origin_y + y * TILE)
-            lanes = slice(w * warp, (w + 1) * warp)
-            taken, lowered[w] = _tile_of_warp(
-                edges, planes, boxes, listed[lanes], left, bottom, hi_z[tile], tile, margin, masks[:, lanes], row
-            )
-            clock[w] += taken
+            left = np.float32(origin_x + tile % TILES_A_ROW * TILE)
+            bottom = np.float32(origin_y + tile // TILES_A_ROW * TILE)
+            lanes = slice(w * warp, min((w + 1) * warp, len(listed)))
+            cycles, lowered[w] = _tile_of_warp(
+                edges, planes, boxes[:, lanes], listed[lanes], left, bottom, hi_z[tile], tile, margin, warp,
+                masks[lanes], row,
+            )  # fmt: skip
+            taken[w] += cycles
             steps[w, 0] += row[CoarseRasterizerEvent.HI_Z_STEPS] - before
             steps[w, 1] += lowered[w] != NO_DEPTH
-        following[w] += 1
-        if following[w] == TILES:
-            longest = w  # the last one to arrive
-            clock[w] = _ARRIVED
-    hi_z[TILES - 1] = min(hi_z[TILES - 1], lowered.min())
+        if tile < TILES - 1:
+            arrival[w] = (TILES - 1) * _TILE + taken[w]
+        following[w] = tile + 1 if lowered[w] != NO_DEPTH else _next_tile(spans[w], tile + 1)
+        clock[w] = following[w] * _TILE + taken[w] if following[w] < TILES else _ARRIVED
+    longest = 0  # the last one to arrive
+    for w in range(warps):
+        hi_z[TILES - 1] = min(hi_z[TILES - 1], lowered[w])
+        longest = w if arrival[w] >= arrival[longest] else longest
     row[CoarseRasterizerEvent.WARPS] += warps
     row[CoarseRasterizerEvent.WARP_LANES] += len(listed)
     row[CoarseRasterizerEvent.CRITICAL_HI_Z_STEPS] += steps[longest, 0]
     row[CoarseRasterizerEvent.CRITICAL_UPDATE_STEPS] += steps[longest, 1]
 
 
-@kernel(error_model="numpy")
-def _append(masks: Any, listed: Any, warp: int, counts: Any, entries: Any, cursors: Any, row: Any) -> None:
-    """Append a round's primitives to the tiles' queues, as a warp's lanes do for theirs."""
+@kernel(error_model="numpy", lent=True)
+def _append(masks: Any, listed: Any, warp: int, counts: Any, appended: Any, used: int, row: Any) -> int:
+    """Append a round's primitives to the tiles' queues, as a warp's lanes do for theirs; returns ``appended`` in use.
+
+    ``appended`` (n, 2) takes tile and primitive of each entry.
+    """
     most = 0
-    for first in range(0, len(counts), warp):
-        before = row[CoarseRasterizerEvent.APPEND_STEPS]
+    for group in range(TILES // warp):
+        steps = 0
         for i in range(len(listed)):
-            some, pair, new = 0, -1, 0
-            for tile in range(first, first + warp):
-                if not masks[tile, i]:
-                    continue
-                some += 1
+            left = masks[i, group]
+            if left == np.uint64(0):
+                continue
+            masks[i, group] = 0
+            steps += 1
+            row[CoarseRasterizerEvent.ENTRIES] += popcount(left)
+            pair, new = -1, 0
+            while left:
+                tile = group * warp + lowest_bit(left)
+                left &= left - np.uint64(1)
                 if counts[tile] % CHUNK == 0:
                     new += pair != tile // 2
                     pair = tile // 2
                 counts[tile] += 1
-                if entries is not None:
-                    entries[cursors[tile]] = listed[i]
-                    cursors[tile] += 1
-            row[CoarseRasterizerEvent.APPEND_STEPS] += some > 0
-            row[CoarseRasterizerEvent.ENTRIES] += some
+                appended[used, 0], appended[used, 1] = tile, listed[i]
+                used += 1
             row[CoarseRasterizerEvent.CHUNK_STEPS] += new > 0
             row[CoarseRasterizerEvent.CHUNK_SECTORS] += new
-        most = max(most, row[CoarseRasterizerEvent.APPEND_STEPS] - before)
+        row[CoarseRasterizerEvent.APPEND_STEPS] += steps
+        most = max(most, steps)
     row[CoarseRasterizerEvent.CRITICAL_APPEND_STEPS] += most
+    return used
 
 
 @kernel(error_model="numpy")
 def rasterize_bin(
     edges: Any, planes: Any, boxes: Any, queue: Any, origin_x: int, origin_y: int, warp: int, margin: int,
-    counts: Any, entries: Any, cursors: Any, row: Any,
+    counts: Any, appended: Any, row: Any,
 ) -> None:  # fmt: skip
-    """One bin: fill ``counts`` (256,), and the queues where ``entries`` is not None."""
+    """One bin: fill ``counts`` (256,), and ``appended`` with tile and primitive of each entry in order."""
     hi_z = np.full(TILES, NO_DEPTH, np.int64)
-    masks = np.empty((TILES, BLOCK), np.bool_)
+    masks = np.zeros((BLOCK, TILES // warp), np.uint64)  # of each primitive, a word for the tiles of each warp
+    near = np.empty((4, BLOCK), np.float32)
+    warps = BLOCK // warp
+    clock, following, taken = np.empty(warps, np.int64), np.empty(warps, np.int64), np.empty(warps, np.int64)
+    lowered, arrival = np.empty(warps, np.int64), np.empty(warps, np.int64)
+    walk = clock, following, taken, lowered, arrival, np.empty((warps, 4), np.int64), np.empty((warps, 2), np.int64)
+    used = 0
     for first in range(0, len(queue), BLOCK):
         listed = queue[first : first + BLOCK]
-        masks[:] = False
+        for i in range(len(listed)):
+            for k in range(4):
+                near[k, i] = boxes[listed[i], k]
         row[CoarseRasterizerEvent.ROUNDS] += 1
-        _test_round(edges, planes, boxes, listed, origin_x, origin_y, warp, margin, hi_z, masks, row)
-        _append(masks, listed, warp, counts, entries, cursors, row)
+        _test_round(edges, planes, near, listed, origin_x, origin_y, warp, margin, hi_z, masks, walk, row)
+        used = _append(masks, listed, warp, counts, appended, used, row)
+
+
+@kernel(error_model="numpy", lent=True)
+def _tiles_of(boxes: Any, origin_x: int, origin_y: int, span: Any) -> None:
+    """Tiles of the bin that some boxes, (4, n), span: the others fail every box test."""
+    span[0] = span[1] = TILES_A_ROW - 1
+    span[2] = span[3] = 0
+    for i in range(boxes.shape[1]):
+        span[0] = min(span[0], (int(boxes[0, i]) - origin_x) // TILE)
+        span[1] = min(span[1], (int(boxes[1, i]) - origin_y) // TILE)
+        span[2] = max(span[2], (int(boxes[2, i]) - origin_x) // TILE)
+        span[3] = max(span[3], (int(boxes[3, i]) - origin_y) // TILE)
+    span[0], span[1] = max(span[0], 0), max(span[1], 0)
+    span[2], span[3] = min(span[2], TILES_A_ROW - 1), min(span[3], TILES_A_ROW - 1)
 
 
 @kernel(error_model="numpy")
-def _tiles_of(boxes: Any, listed: Any, origin_x: int, origin_y: int) -> tuple[int, int, int, int]:
-    """Tiles of the bin that the boxes of a warp's primitives span: the others fail every box test."""
-    low_x, low_y, high_x, high_y = TILES_A_ROW - 1, TILES_A_ROW - 1, 0, 0
-    for p in listed:
-        low_x = min(low_x, (int(boxes[p, 0]) - origin_x) // TILE)
-        low_y = min(low_y, (int(boxes[p, 1]) - origin_y) // TILE)
-        high_x = max(high_x, (int(boxes[p, 2]) - origin_x) // TILE)
-        high_y = max(high_y, (int(boxes[p, 3]) - origin_y) // TILE)
-    last = TILES_A_ROW - 1
-    return max(low_x, 0), max(low_y, 0), min(high_x, last), min(high_y, last)
+def most_entries(boxes: Any, queue: Any, origin_x: int, origin_y: int) -> int:
+    """Count the tiles of a bin that the boxes of its primitives meet: as many entries it makes at most."""
+    span = np.empty(4, np.int64)
+    near = np.empty((4, 1), np.float32)
+    count = 0
+    for p in queue:
+        near[:, 0] = boxes[p]
+        _tiles_of(near, origin_x, origin_y, span)
+        count += max(0, span[2] - span[0] + 1) * max(0, span[3] - span[1] + 1)
+    return count

@@ -26,6 +26,7 @@ from tilestamp.simulator.stages.zhang2025.coarse_bin import (
     TILES,
     TILES_A_ROW,
     CoarseRasterizerEvent,
+    most_entries,
     rasterize_bin,
 )
 from tilestamp.simulator.stages.zhang2025.primitive_binning import BIN, BINS_A_ROW, BinQueues
@@ -53,19 +54,36 @@ class TileQueues(NamedTuple):
     columns: int
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
+def _most_entries(boxes: Any, starts: Any, queue: Any, columns: int, most: Any) -> None:
+    """Room for the entries of each bin."""
+    for i in range(len(most)):
+        x, y = i % columns, i // columns
+        b = x + y * BINS_A_ROW
+        most[i] = most_entries(boxes, queue[starts[b] : starts[b + 1]], x * BIN, y * BIN)
+
+
+@kernel(error_model="numpy", lent=True)
 def _coarse_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, boxes: Any, starts: Any, queue: Any, columns: int, warp: int,
-    margin: int, counts: Any, entries: Any, cursors: Any, events: Any,
+    margin: int, counts: Any, rooms: Any, appended: Any, events: Any,
 ) -> None:  # fmt: skip
     """A part of the bins."""
     for i in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         x, y = i % columns, i // columns
         b = x + y * BINS_A_ROW
         listed = queue[starts[b] : starts[b + 1]]
-        rasterize_bin(
-            edges, planes, boxes, listed, x * BIN, y * BIN, warp, margin, counts[i], entries, cursors[i], events[i]
-        )
+        room = appended[rooms[i] : rooms[i + 1]]
+        rasterize_bin(edges, planes, boxes, listed, x * BIN, y * BIN, warp, margin, counts[i], room, events[i])
+
+
+@kernel(lent=True)
+def _place(counts: Any, rooms: Any, appended: Any, cursors: Any, entries: Any) -> None:
+    """Put the entries of each bin into the queues of their tiles."""
+    for i in range(len(counts)):
+        for n in range(rooms[i], rooms[i] + counts[i].sum()):
+            entries[cursors[i, appended[n, 0]]] = appended[n, 1]
+            cursors[i, appended[n, 0]] += 1
 
 
 def coarse_rasterizer(
@@ -102,17 +120,20 @@ def coarse_rasterizer(
     """
     columns, rows = -(-width // BIN), -(-height // BIN)
     margin = (EXACT if exact_hi_z else HI_Z_MARGIN) if hi_z else NO_HI_Z
-    shape = (*data[:3], bins.starts, bins.entries, columns, simt.warp, margin)
     counts = np.zeros((columns * rows, TILES), np.int64)
     events = np.zeros((columns * rows, len(CoarseRasterizerEvent)), np.int64)
-    cursors = np.zeros((columns * rows, TILES), np.int64)
-    for_parts(_coarse_rasterizer, len(events), *shape, counts, None, cursors, events)
+    rooms = np.zeros(len(events) + 1, np.int64)
+    _most_entries(data.boxes, *bins, columns, rooms[1:])
+    rooms = np.cumsum(rooms)
+    appended = np.empty((rooms[-1], 2), np.int32)
+    for_parts(
+        _coarse_rasterizer, len(events), *data[:3], *bins, columns, simt.warp, margin, counts, rooms, appended, events
+    )
     by_row = counts.reshape(rows, columns, TILES_A_ROW, TILES_A_ROW).swapaxes(1, 2)
     starts = np.concatenate([[0], np.cumsum(by_row.ravel())]).astype(np.int64)
     firsts = starts[:-1].reshape(by_row.shape).swapaxes(1, 2).reshape(columns * rows, TILES)
     entries = np.empty(int(starts[-1]), np.int32)
-    cursors = firsts.copy()  # of one bin, a view would move the starts
-    for_parts(_coarse_rasterizer, len(events), *shape, np.zeros_like(counts), entries, cursors, np.zeros_like(events))
+    _place(counts, rooms, appended, firsts.copy(), entries)  # of one bin, a view would move the starts
     events[:, CoarseRasterizerEvent.FILLS] = _fills(bins, columns, rows)
     _add_costs(events, counts, -(-len(data.ids) // BLOCK), simt)
     total = events.sum(axis=0)

@@ -22,13 +22,13 @@ _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def depth_24_bit(z: Any) -> int:
     """Round a depth in [0, 1] as the original keeps it."""
     return int(min(max(z, _ZERO), _ONE) * DEPTH_STEPS)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def fragment_depth(planes: Any, x: int, y: int, way: int) -> Any:
     """Depth of a fragment as the ROP gets it, by one of ``FRAGMENT_DEPTHS``."""
     plane = planes[DEPTH]

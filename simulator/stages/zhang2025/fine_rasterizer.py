@@ -50,7 +50,7 @@ class TileFragments(NamedTuple):
     depth: NDArray[np.uint32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _fine_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, starts: Any, entries: Any, tile_columns: int, warp: int,
     early_z: bool, optimized: bool, masks: Any, depth: Any, events: Any,
@@ -112,7 +112,7 @@ def fine_rasterizer(
     table = _by_block(events, group)
     total = table.sum(axis=0)
     pixels = width * height
-    drawn = len(np.unique(tiles.entries))
+    drawn = int(np.count_nonzero(np.bincount(tiles.entries)))
     quads = 4 * int(total[FineRasterizerEvent.QUADS])
     streams = (
         Stream("tile_queue", "load", 4 * len(tiles.entries), 4 * len(tiles.entries)),

@@ -5,17 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.depth import depth_24_bit
+from tilestamp.simulator.stages.zhang2025.stepped_tile import stepped_tile
 from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
 
-QUADS = 16  # of a tile
+_QUADS = np.uint64(0x0055005500550055)  # left lower pixels of the 16 quads of a tile
 GROUP = 8  # primitives whose quads four lanes each write side by side
 _HALF = np.float32(0.5)
-_ZERO = np.float32(0.0)
 
 
 @shown(*SAMPLE_COUNTERS)
@@ -48,108 +49,75 @@ class FineRasterizerEvent(IntEnum):
     GROUP_LANES = 23  # four of each primitive
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def coverage(edges: Any, left: int, bottom: int, columns: int, rows: int) -> Any:
     """64-bit coverage of a tile by one primitive, limited to ``columns`` x ``rows`` pixels on the screen."""
-    mask = np.uint64(0)
     x, y = np.float32(left) + _HALF, np.float32(bottom) + _HALF
-    e0 = edges[0, 0] * x + edges[0, 1] * y + edges[0, 2]
-    e1 = edges[1, 0] * x + edges[1, 1] * y + edges[1, 2]
-    e2 = edges[2, 0] * x + edges[2, 1] * y + edges[2, 2]
-    for column in range(columns):  # each column of the original's chain steps up by itself
-        d0, d1, d2 = e0, e1, e2
-        for row in range(rows):
-            if d0 >= _ZERO and d1 >= _ZERO and d2 >= _ZERO:
-                mask |= np.uint64(1) << np.uint64(row * TILE + column)
-            d0 += edges[0, 1]
-            d1 += edges[1, 1]
-            d2 += edges[2, 1]
-        e0 += edges[0, 0]
-        e1 += edges[1, 0]
-        e2 += edges[2, 0]
-    return mask
+    mask = stepped_tile(
+        (edges[0, 0] * x + edges[0, 1] * y + edges[0, 2], edges[0, 0], edges[0, 1]),
+        (edges[1, 0] * x + edges[1, 1] * y + edges[1, 2], edges[1, 0], edges[1, 1]),
+        (edges[2, 0] * x + edges[2, 1] * y + edges[2, 2], edges[2, 0], edges[2, 1]),
+    )
+    right = np.uint64(0x0101010101010101) * np.uint64((1 << columns) - 1)
+    return mask & right & (~np.uint64(0) >> np.uint64(TILE * (TILE - rows)))
 
 
-@kernel(error_model="numpy")
-def _early_z(plane: Any, mask: Any, left: int, bottom: int, depth: Any, hits: Any, early_z: bool) -> Any:
+@kernel(error_model="numpy", lent=True)
+def _early_z(plane: Any, mask: Any, left: int, bottom: int, depth: Any, early_z: bool) -> Any:
     """Depth-test the covered pixels of one primitive; returns those that pass."""
-    passed = mask
-    for i in range(TILE * TILE):
+    passed = untested = mask
+    while untested != np.uint64(0):
+        i = lowest_bit(untested)
         bit = np.uint64(1) << np.uint64(i)
-        if mask & bit == np.uint64(0):
-            continue
-        hits[i] += 1
+        untested ^= bit
         x, y = left + i % TILE, bottom + i // TILE
         z = depth_24_bit(evaluate(plane, np.float32(x) + _HALF, np.float32(y) + _HALF))
         if early_z and z > depth[y, x]:
-            passed &= ~bit
+            passed ^= bit
         depth[y, x] = min(depth[y, x], z)
     return passed
 
 
-@kernel(error_model="numpy")
-def quad_mask(mask: Any) -> int:
-    """Which of the 16 quads of a tile have a live pixel."""
-    quads = 0
-    for q in range(QUADS):
-        corner = np.uint64(0x303) << np.uint64((q // 4) * 16 + (q % 4) * 2)
-        if mask & corner != np.uint64(0):
-            quads |= 1 << q
-    return quads
+@kernel(error_model="numpy", lent=True)
+def live_quads(mask: Any) -> Any:
+    """Bits of the left lower pixels of those of the 16 quads of a tile that have a live pixel."""
+    pairs = mask | mask >> np.uint64(1)
+    return (pairs | pairs >> np.uint64(TILE)) & _QUADS
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def rasterize_tile(
     edges: Any, planes: Any, queue: Any, left: int, bottom: int, warp: int, early_z: bool, optimized: bool,
     masks: Any, depth: Any, row: Any,
 ) -> None:  # fmt: skip
     """One tile: its primitives in rounds of a warp."""
-    hits = np.zeros(TILE * TILE, np.int64)
     columns, rows = min(TILE, depth.shape[1] - left), min(TILE, depth.shape[0] - bottom)
+    together = GROUP if optimized else warp  # primitives whose quads are written in the same steps
     row[FineRasterizerEvent.WARPS] += 1
     for first in range(0, len(queue), warp):
         end = min(len(queue), first + warp)
-        hits[:] = 0
-        written = np.zeros(warp, np.int64)  # quads of each lane
+        hits = quads = quad_steps = 0
+        covered = written = np.uint64(0)  # by a lane of the round, of the group
         for i in range(first, end):
             p = queue[i]
             mask = coverage(edges[p], left, bottom, columns, rows)
-            masks[i] = _early_z(planes[p, DEPTH], mask, left, bottom, depth, hits, early_z)
-            written[i - first] = quad_mask(masks[i])
+            masks[i] = _early_z(planes[p, DEPTH], mask, left, bottom, depth, early_z)
+            hits += popcount(mask)
+            covered |= mask
+            quads += popcount(live_quads(masks[i]))
+            written |= live_quads(masks[i])
+            if (i - first) % together == together - 1 or i == end - 1:
+                quad_steps += popcount(written)
+                written = np.uint64(0)
         row[FineRasterizerEvent.ROUNDS] += 1
         row[FineRasterizerEvent.ROUND_LANES] += end - first
         row[FineRasterizerEvent.GROUP_STEPS] += -(-(end - first) // GROUP)
         row[FineRasterizerEvent.GROUP_LANES] += 4 * (end - first)
         row[FineRasterizerEvent.SAMPLE_TESTS] += TILE * TILE * (end - first)
-        for i in range(TILE * TILE):
-            row[FineRasterizerEvent.SAMPLE_HITS] += hits[i]
-            row[FineRasterizerEvent.EARLY_Z_STEPS] += hits[i] > 0
-            row[FineRasterizerEvent.SHARED_ATOMIC] += hits[i] > 0
-            row[FineRasterizerEvent.BANK_REPLAYS] += max(0, hits[i] - 1)
-        row[FineRasterizerEvent.QUAD_STEPS] += _quad_steps(written, optimized)
-        for lane in range(warp):
-            quads = _bits(written[lane])
-            row[FineRasterizerEvent.QUADS] += quads
-            row[FineRasterizerEvent.QUAD_LANES] += 4 * quads if optimized else quads
-
-
-@kernel(error_model="numpy")
-def _bits(quads: int) -> int:
-    count = 0
-    while quads:
-        quads &= quads - 1
-        count += 1
-    return count
-
-
-@kernel(error_model="numpy")
-def _quad_steps(written: Any, optimized: bool) -> int:
-    """Warp steps that write: over 16 quads for each group of 8 lanes' primitives, or for all lanes at once."""
-    group = GROUP if optimized else len(written)
-    steps = 0
-    for first in range(0, len(written), group):
-        some = 0
-        for lane in range(first, first + group):
-            some |= written[lane]
-        steps += _bits(some)
-    return steps
+        row[FineRasterizerEvent.SAMPLE_HITS] += hits
+        row[FineRasterizerEvent.EARLY_Z_STEPS] += popcount(covered)
+        row[FineRasterizerEvent.SHARED_ATOMIC] += popcount(covered)
+        row[FineRasterizerEvent.BANK_REPLAYS] += hits - popcount(covered)
+        row[FineRasterizerEvent.QUAD_STEPS] += quad_steps
+        row[FineRasterizerEvent.QUADS] += quads
+        row[FineRasterizerEvent.QUAD_LANES] += 4 * quads if optimized else quads

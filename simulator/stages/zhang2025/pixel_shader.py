@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -19,6 +20,7 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import FRAGMENT_BYTES, TileFragments
+from tilestamp.simulator.stages.zhang2025.fine_tile import live_quads
 from tilestamp.simulator.stages.zhang2025.pixel_shader_block import (
     BILINEAR,
     BLOCK,
@@ -56,27 +58,27 @@ class FragmentStream(NamedTuple):
     colors: NDArray[np.float32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any) -> int:
     """Lay the quads out in stream order: by tile, entry, place; with ``entries`` None only count."""
     count = 0
     for tile in range(len(starts) - 1):
         for i in range(starts[tile], starts[tile + 1]):
-            if masks[i] == np.uint64(0):
+            quads = live_quads(masks[i])
+            if entries is None:
+                count += popcount(quads)
                 continue
-            for q in range(16):
-                corner = np.uint64(0x303) << np.uint64((q // 4) * 16 + (q % 4) * 2)
-                if masks[i] & corner == np.uint64(0):
-                    continue
-                if entries is not None:
-                    entries[count] = i
-                    places[count, 0] = tile % tile_columns * TILE + q % 4 * 2
-                    places[count, 1] = tile // tile_columns * TILE + q // 4 * 2
+            while quads != np.uint64(0):
+                corner = lowest_bit(quads)
+                quads &= quads - np.uint64(1)
+                entries[count] = i
+                places[count, 0] = tile % tile_columns * TILE + corner % TILE
+                places[count, 1] = tile // tile_columns * TILE + corner // TILE
                 count += 1
     return count
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _pixel_shader(
     part: int, parts: int, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any,
     method: int, opacity: Any, rule: int, merge: int, width: int, colors: Any, events: Any,

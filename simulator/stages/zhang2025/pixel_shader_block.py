@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tilestamp.models.atomics import count_atomics
+from tilestamp.models.atomics import SECTOR, count_atomics
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.counters import shown, size
 from tilestamp.models.kernel import kernel
@@ -57,7 +57,7 @@ class PixelShaderEvent(IntEnum):
     MAGNIFIED_WARPS = 18  # warps with a quad of which a texel covers two pixels each way
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def quad_coordinates(planes: Any, place: Any, uv: Any) -> None:
     """Perspective-correct texture coordinates of a quad's four pixels, (4, 2)."""
     for k in range(4):
@@ -67,7 +67,7 @@ def quad_coordinates(planes: Any, place: Any, uv: Any) -> None:
         uv[k, 1] = evaluate(planes[UV + 1], x, y) * w
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _light(planes: Any, x: Any, y: Any) -> Any:
     """Light from the eye; the factor w of the normal cancels in its direction."""
     nx, ny = evaluate(planes[NORMAL], x, y), evaluate(planes[NORMAL + 1], x, y)
@@ -76,7 +76,7 @@ def _light(planes: Any, x: Any, y: Any) -> Any:
     return AMBIENT + DIFFUSE * abs(nz) / np.sqrt(length) if length > _ZERO else _ONE
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _shade_quad(
     planes: Any, chains: Any, texture: int, method: int, opacity: Any, place: Any, uv: Any, out: Any
 ) -> Any:
@@ -106,7 +106,7 @@ def _shade_quad(
     return lod, step <= MAGNIFIED
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: int, addresses: Any) -> None:
     """Byte addresses of the texels that a quad's four lanes load, ``addresses`` (8, lanes)."""
     levels = 2 if method == TRILINEAR else 1
@@ -129,6 +129,7 @@ def shade_block(
 ) -> None:  # fmt: skip
     """One block: eight warps of eight quads."""
     links = np.empty(4 * QUADS_A_WARP, np.int64)
+    pair = 2 - width % 2  # two pixels of a quad side by side lie in one sector, where rows are even
     uv = np.zeros((4, 2), np.float32)
     addresses = np.empty((8, 4 * QUADS_A_WARP), np.int64)
     for warp in range(first, min(first + BLOCK // 4, len(quads)), QUADS_A_WARP):
@@ -138,8 +139,9 @@ def shade_block(
         for q in range(warp, end):
             p = queue[quads[q]]
             texture = texture_ids[ids[p]]
-            for k in range(4):
-                links[4 * (q - warp) + k] = 4 * (places[q, 0] + k % 2 + width * (places[q, 1] + k // 2))
+            for k in range(0, 4, pair):
+                at = places[q, 0] + k % 2 + width * (places[q, 1] + k // 2)
+                links[(4 * (q - warp) + k) // pair] = 4 * at
             lod, large = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
             if row is not None and texture >= 0:
                 _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
@@ -150,11 +152,11 @@ def shade_block(
             row[PixelShaderEvent.WARP_LANES] += 4 * (end - warp)
             row[PixelShaderEvent.TEXTURED_WARPS] += textured > 0
             row[PixelShaderEvent.MAGNIFIED_WARPS] += magnified > 0
-            lanes, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP, merge)
+            lanes, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP // pair, merge)
             row[PixelShaderEvent.ATOMIC] += 1
-            row[PixelShaderEvent.ATOMIC_LANES] += lanes
-            row[PixelShaderEvent.ATOMIC_REQUESTS] += requests
-            row[PixelShaderEvent.ATOMIC_CONFLICTS] += conflicts
+            row[PixelShaderEvent.ATOMIC_LANES] += pair * lanes
+            row[PixelShaderEvent.ATOMIC_REQUESTS] += requests if merge == SECTOR else pair * requests
+            row[PixelShaderEvent.ATOMIC_CONFLICTS] += pair * conflicts
             row[PixelShaderEvent.ATOMIC_DEPTH] += depth
             loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
             row[PixelShaderEvent.TEXEL_LOADS] += loads

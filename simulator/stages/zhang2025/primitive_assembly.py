@@ -67,60 +67,64 @@ class Primitives(NamedTuple):
     ids: NDArray[np.int32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _put(
-    polygon: Any, a: int, b: int, c: int, width: Any, height: Any, culling: bool, screen: Any, varyings: Any
+    vertices: Any, a: int, b: int, c: int, width: Any, height: Any, culling: bool, screen: Any, varyings: Any
 ) -> bool:
     """Divide by w, map to the screen, store one piece; False where it faces away."""
     for k in range(3):
-        v = polygon[a if k == 0 else b if k == 1 else c]
-        screen[k, 0] = (v[0] / v[3] + _ONE) * _HALF * width
-        screen[k, 1] = (v[1] / v[3] + _ONE) * _HALF * height
-        screen[k, 2] = (v[2] / v[3] + _ONE) * _HALF
-        screen[k, 3] = v[3]
-        varyings[k] = v[4:]
+        v = a if k == 0 else b if k == 1 else c
+        w = vertices[v, 3]
+        screen[k, 0] = (vertices[v, 0] / w + _ONE) * _HALF * width
+        screen[k, 1] = (vertices[v, 1] / w + _ONE) * _HALF * height
+        screen[k, 2] = (vertices[v, 2] / w + _ONE) * _HALF
+        screen[k, 3] = w
+        for n in range(VARYINGS):
+            varyings[k, n] = vertices[v, 4 + n]
     ux, uy = screen[1, 0] - screen[0, 0], screen[1, 1] - screen[0, 1]
     vx, vy = screen[2, 0] - screen[0, 0], screen[2, 1] - screen[0, 1]
     area = ux * vy - uy * vx
     if area < _ZERO and not culling:  # the edge functions want counter-clockwise corners
-        screen[1], screen[2] = screen[2].copy(), screen[1].copy()
-        varyings[1], varyings[2] = varyings[2].copy(), varyings[1].copy()
+        for n in range(4):
+            screen[1, n], screen[2, n] = screen[2, n], screen[1, n]
+        for n in range(VARYINGS):
+            varyings[1, n], varyings[2, n] = varyings[2, n], varyings[1, n]
     return area > _ZERO or (area < _ZERO and not culling)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _primitive_assembly(
-    clip: Any, varyings: Any, triangles: Any, width: Any, height: Any, culling: bool,
-    screen: Any, out_varyings: Any, ids: Any, clipped: Any, events: Any,
+    vertices: Any, triangles: Any, width: Any, height: Any, culling: bool, polygon: Any, scratch: Any,
+    screen: Any, varyings: Any, ids: Any, clipped: Any, events: Any,
 ) -> int:  # fmt: skip
     """Assemble all triangles, and mark those that are cut into pieces; returns the slots in use."""
-    polygon = np.empty((MOST_VERTICES, 4 + varyings.shape[1]), np.float32)
-    scratch = np.empty_like(polygon)
     used = len(triangles)
     for t in range(len(triangles)):
-        every, some = 63, 0
-        for k in range(3):
-            polygon[k, :4] = clip[triangles[t, k]]
-            polygon[k, 4:] = varyings[triangles[t, k]]
-            code = outcode(polygon[k])
-            every &= code
-            some |= code
-        count = 0 if every else 3 if some == 0 else clip_polygon(polygon, scratch, 3)
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        codes = outcode(vertices[a]), outcode(vertices[b]), outcode(vertices[c])
+        count = pieces = 0
         ids[t] = -1
+        if codes[0] | codes[1] | codes[2] == 0:
+            count = 3
+            pieces = int(_put(vertices, a, b, c, width, height, culling, screen[t], varyings[t]))
+            ids[t] = t if pieces else -1
+        elif codes[0] & codes[1] & codes[2] == 0:
+            for k in range(3):
+                for n in range(vertices.shape[1]):
+                    polygon[k, n] = vertices[triangles[t, k], n]
+            count = clip_polygon(polygon, scratch, 3)
+            for j in range(1, count - 1):
+                slot = t if count == 3 else used
+                front = _put(polygon, 0, j, j + 1, width, height, culling, screen[slot], varyings[slot])
+                ids[slot] = t if front else -1
+                pieces += front
+                used += count > 3
         clipped[t] = count > 3
-        pieces = 0
-        for j in range(1, count - 1):
-            slot = t if count == 3 else used
-            front = _put(polygon, 0, j, j + 1, width, height, culling, screen[slot], out_varyings[slot])
-            ids[slot] = t if front else -1
-            pieces += front
-            used += clipped[t]
-        if events is not None:
-            row = events[t // BLOCK]
-            row[PrimitiveAssemblyEvent.WARP_LANES] += 1
-            row[PrimitiveAssemblyEvent.CLIPPED] += clipped[t]
-            row[PrimitiveAssemblyEvent.CULLED] += pieces == 0
-            row[PrimitiveAssemblyEvent.PIECES] += max(1, count - 2)
+        row = events[t // BLOCK]
+        row[PrimitiveAssemblyEvent.WARP_LANES] += 1
+        row[PrimitiveAssemblyEvent.CLIPPED] += count > 3
+        row[PrimitiveAssemblyEvent.CULLED] += pieces == 0
+        row[PrimitiveAssemblyEvent.PIECES] += max(1, count - 2)
     return used
 
 
@@ -175,8 +179,8 @@ def primitive_assembly(
     works : one
     """
     count = len(mesh.triangles)
-    x, y, z, w = vertices.clip.T
-    crossing = ((np.abs(x) > w) | (np.abs(y) > w) | (np.abs(z) > w))[mesh.triangles].any(axis=1)
+    xyz, w = vertices.clip[:, :3], vertices.clip[:, 3:]
+    crossing = np.asarray((np.abs(xyz) > w).any(axis=1))[mesh.triangles].any(axis=1)
     slots = count + MOST_PIECES * int(crossing.sum())
     out = Primitives(
         np.empty((slots, 3, 4), np.float32), np.empty((slots, 3, VARYINGS), np.float32), np.full(slots, -1, np.int32)
@@ -185,7 +189,9 @@ def primitive_assembly(
     events = np.zeros((blocks, len(PrimitiveAssemblyEvent)), np.int64)
     clipped = np.zeros(count, np.bool_)
     size = np.float32(width), np.float32(height)
-    used = _primitive_assembly(*vertices, mesh.triangles, *size, culling, *out, clipped, events)
+    whole = np.concatenate(vertices, axis=1)
+    polygons = np.empty((2, MOST_VERTICES, whole.shape[1]), np.float32)
+    used = _primitive_assembly(whole, mesh.triangles, *size, culling, *polygons, *out, clipped, events)
     _count_memory(mesh.triangles, clipped, simt.warp, int(simt.coalescing), int(simt.atomic_merge), events)
     segment = smallest_transaction_bytes(int(simt.coalescing))
     stores = events[:, PrimitiveAssemblyEvent.PIECES] * (PRIMITIVE_BYTES // 4)  # a lane's words lie 112 bytes apart
@@ -193,7 +199,7 @@ def primitive_assembly(
     events[:, PrimitiveAssemblyEvent.STORE_BYTES] = stores * segment
     streams = (
         Stream("indices", "load", 12 * count, 12 * count),
-        Stream("vertices_out", "load", 3 * VERTEX_BYTES * count, len(x) * VERTEX_BYTES),
+        Stream("vertices_out", "load", 3 * VERTEX_BYTES * count, len(whole) * VERTEX_BYTES),
         Stream("primitives", "store", int(stores.sum()) * segment, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"

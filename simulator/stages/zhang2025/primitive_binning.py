@@ -69,7 +69,7 @@ class BinQueues(NamedTuple):
     entries: NDArray[np.int32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
     """First and last bin of a box in each direction."""
     left = min(max(int(box[0]) // BIN, 0), columns - 1)
@@ -82,48 +82,40 @@ def _bins(box: Any, columns: int, rows: int) -> tuple[int, int, int, int]:
 @kernel(error_model="numpy")
 def _count(boxes: Any, columns: int, rows: int, warp: int, counts: Any, events: Any) -> None:
     """Entries by sub-queue and bin, ``counts`` (blocks, 256), and the steps of each warp over the bins of its boxes."""
-    bins = np.empty(warp, np.int64)  # of the lanes in one step
-    ranks = np.empty(warp, np.int64)
+    spans = np.empty((warp, 4), np.int64)  # left and lowest bin of each lane's box, bins across, bins in all
+    ranks = np.empty((MAX_BINS, warp), np.int64)  # of a lane at a step in its bin
+    last = np.full(MAX_BINS, -1, np.int64)  # sector of a queue that was written last, and in which step
     for first in range(0, len(boxes), warp):
         row, queues = events[first // BLOCK], counts[first // BLOCK]
         lanes = min(warp, len(boxes) - first)
-        row[PrimitiveBinningEvent.LIVE_WARPS] += 1
-        before = queues.copy()
         steps = 1
-        step = 0
-        while step < steps:
+        for lane in range(lanes):
+            left, right, bottom, top = _bins(boxes[first + lane], columns, rows)
+            wide = right - left + 1
+            many = wide * (top - bottom + 1)
+            spans[lane, 0], spans[lane, 1], spans[lane, 2], spans[lane, 3] = left, bottom, wide, many
+            steps = max(steps, many)
+            for step in range(many):
+                b = left + step % wide + (bottom + step // wide) * BINS_A_ROW
+                ranks[step, lane] = queues[b]
+                queues[b] += 1
+        row[PrimitiveBinningEvent.LIVE_WARPS] += 1
+        row[PrimitiveBinningEvent.BIN_STEPS] += steps
+        for step in range(steps):
+            bases = 0  # sectors of the queues' bases, a bit each
             for lane in range(lanes):
-                left, right, bottom, top = _bins(boxes[first + lane], columns, rows)
-                wide = right - left + 1
-                many = wide * (top - bottom + 1)
-                steps = max(steps, many)
-                bins[lane] = left + step % wide + (bottom + step // wide) * BINS_A_ROW if step < many else -1
-                if bins[lane] >= 0:
-                    queues[bins[lane]] += 1
-                ranks[lane] = before[bins[lane]] + _earlier(boxes, first, lane, bins[lane], columns, rows)
-            row[PrimitiveBinningEvent.BIN_STEPS] += 1
-            for lane in range(lanes):
-                new_base = new_entry = bins[lane] >= 0
-                for other in range(lane):
-                    new_base &= bins[other] < 0 or bins[other] // A_SECTOR != bins[lane] // A_SECTOR
-                    new_entry &= bins[other] != bins[lane] or ranks[other] // A_SECTOR != ranks[lane] // A_SECTOR
-                row[PrimitiveBinningEvent.BIN_LANES] += bins[lane] >= 0
-                row[PrimitiveBinningEvent.BASE_SECTORS] += new_base
-                row[PrimitiveBinningEvent.ENTRY_SECTORS] += new_entry
-            step += 1
+                if step >= spans[lane, 3]:
+                    continue
+                b = spans[lane, 0] + step % spans[lane, 2] + (spans[lane, 1] + step // spans[lane, 2]) * BINS_A_ROW
+                sector = ranks[step, lane] // A_SECTOR + (first * MAX_BINS + step) * MAX_BINS  # ranks in a bin rise
+                row[PrimitiveBinningEvent.BIN_LANES] += 1
+                row[PrimitiveBinningEvent.BASE_SECTORS] += 1 - (bases >> b // A_SECTOR & 1)
+                row[PrimitiveBinningEvent.ENTRY_SECTORS] += sector != last[b]
+                bases |= 1 << b // A_SECTOR
+                last[b] = sector
 
 
-@kernel(error_model="numpy")
-def _earlier(boxes: Any, first: int, lane: int, b: int, columns: int, rows: int) -> int:
-    """Count the lanes before one whose boxes meet a bin: they write in front of it."""
-    count = 0
-    for other in range(lane):
-        left, right, bottom, top = _bins(boxes[first + other], columns, rows)
-        count += left <= b % BINS_A_ROW <= right and bottom <= b // BINS_A_ROW <= top
-    return count
-
-
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _fill(boxes: Any, columns: int, rows: int, cursor: Any, entries: Any) -> None:
     """Write the queues; ``cursor`` (256,) runs ahead in each bin."""
     for p in range(len(boxes)):

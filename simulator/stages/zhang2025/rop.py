@@ -19,7 +19,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import TileQueues
-from tilestamp.simulator.stages.zhang2025.depth import DEPTH_STEPS, FRAGMENT_DEPTHS
+from tilestamp.simulator.stages.zhang2025.depth import FRAGMENT_DEPTHS
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import TileFragments
 from tilestamp.simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, FragmentStream
 from tilestamp.simulator.stages.zhang2025.rop_block import BLOCK_SIDE, RopEvent, resolve_block
@@ -31,7 +31,7 @@ Order = Literal["api", "oit"]
 FragmentDepth = Literal["direct", "stepped", "biased"]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
     """Link the lists as PixelShader's atomicExch leaves them, in stream order."""
     height, width = heads.shape
@@ -45,17 +45,16 @@ def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
 
 @kernel(error_model="numpy")
 def _rop(
-    part: int, parts: int, heads: Any, links: Any, quads: Any, colors: Any, masks: Any, queue: Any, planes: Any,
-    ids: Any, columns: int, warp: int, order: int, way: int, limit: int, target: Any, depth: Any, winners: Any,
-    events: Any,
+    part: int, parts: int, heads: Any, links: Any, fragments: Any, primitives: Any, columns: int, warp: int,
+    order: int, way: int, limit: int, depth: Any, resolved: Any, events: Any,
 ) -> None:  # fmt: skip
     """Resolve a part of the blocks."""
+    keys = np.empty((limit, 4), np.int64)
     for block in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         left, bottom = block % columns * BLOCK_SIDE, block // columns * BLOCK_SIDE
         resolve_block(
-            heads, links, quads, colors, masks, queue, planes, ids, left, bottom,
-            warp, order, way, limit, target, depth, winners, events[block],
-        )  # fmt: skip
+            heads, links, fragments, primitives, left, bottom, warp, order, way, keys, depth, resolved, events[block]
+        )
 
 
 class Resolved(NamedTuple):
@@ -104,19 +103,22 @@ def rop(
     works : one, a row a block
     """
     height, width = fragments.depth.shape
-    heads, links = np.full((height, width), -1, np.int64), np.full(4 * len(stream.entries), -1, np.int64)
+    heads, links = np.full((height, width), -1, np.int32), np.full(4 * len(stream.entries), -1, np.int32)
     _link(stream.entries, stream.places, heads, links)
     if zero_ends:
         heads[heads == 0] = links[links == 0] = -1
-    target, winners = np.zeros((height, width, 4), np.float32), np.full((height, width), -1, np.int32)
-    depth = fragments.depth.astype(np.int64)
+    out = Resolved(
+        np.zeros((height, width, 4), np.float32),
+        np.empty((height, width), np.float32),
+        np.full((height, width), -1, np.int32),
+    )
     columns, rows = -(-width // BLOCK_SIDE), -(-height // BLOCK_SIDE)
     events = np.zeros((columns * rows, len(RopEvent)), np.int64)
     room = limit or max(1, int(np.diff(tiles.starts).max(initial=1)))
     for_parts(
-        _rop, parts_of(len(events)), heads, links, stream.entries, stream.colors, fragments.masks, tiles.entries,
-        data.planes, data.ids, columns, simt.warp, 0 if order == "api" else 1, FRAGMENT_DEPTHS[fragment_depth],
-        room, target, depth, winners, events,
+        _rop, parts_of(len(events)), heads, links,
+        (stream.entries, stream.colors, fragments.masks, tiles.entries), (data.planes, data.ids), columns, simt.warp,
+        0 if order == "api" else 1, FRAGMENT_DEPTHS[fragment_depth], room, fragments.depth, tuple(out), events,
     )  # fmt: skip
     _add_costs(events)
     total = events.sum(axis=0)
@@ -141,9 +143,7 @@ def rop(
         shared_bytes=shared,
         streams=streams,
     )
-    far = depth > int(DEPTH_STEPS)
-    shown = np.where(far, np.float32(1.0), depth / DEPTH_STEPS).astype(np.float32)
-    return StageResult(Resolved(target, shown, winners), (work,))
+    return StageResult(out, (work,))
 
 
 def _add_costs(events: NDArray[np.int64]) -> None:

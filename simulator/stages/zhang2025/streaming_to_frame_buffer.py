@@ -20,7 +20,7 @@ _ONE = np.float32(1.0)
 _FULL = np.float32(255.0)
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _streaming(part: int, parts: int, target: Any, image: Any) -> None:
     """Convert a part of the rows, the last one first."""
     rows = len(target)

@@ -46,7 +46,7 @@ class TriangleSetupData(NamedTuple):
     ids: NDArray[np.int32]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> None:
     """Set up one primitive."""
     for k in range(3):
@@ -72,13 +72,13 @@ def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> Non
         box[2 + d] = max(screen[0, d], screen[1, d], screen[2, d])
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def _triangle_setup(part: int, parts: int, screen: Any, varyings: Any, edges: Any, planes: Any, boxes: Any) -> None:
     for p in range(part * len(screen) // parts, (part + 1) * len(screen) // parts):
         _setup(screen[p], varyings[p], edges[p], planes[p], boxes[p])
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", lent=True)
 def evaluate(plane: Any, x: Any, y: Any) -> Any:
     """Value of a plane (device function)."""
     return plane[0] * x + plane[1] * y + plane[2]
