@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask
-from tilestamp.simulator.stages.laine2011.exact import lowest_bit
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE, Draw, corner
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
