@@ -86,12 +86,12 @@ def bound_and_split(points, matrix, width, height, bound, whole_pixels=False, ma
             return [entry[:4] for entry in queue], passes
 
 
-def grid(net, level, i, j, matrix, width, height):
-    """Screen x, y and depth of the 16 vertices of a sub-patch."""
+def grid(net, level, i, j, matrix, width, height, side=4):
+    """Screen x, y and depth of the vertices of a sub-patch, ``side`` a side."""
     vertices = []
-    for row in range(4):
-        for column in range(4):
-            u, v = (i + column / 3) / 2**level, (j + row / 3) / 2**level
+    for row in range(side):
+        for column in range(side):
+            u, v = (i + column / (side - 1)) / 2**level, (j + row / (side - 1)) / 2**level
             x, y, w, z = to_screen([surface(net, u, v)], matrix, width, height)[0]
             vertices.append((x / w, y / w, z / w))
     return vertices

@@ -108,7 +108,7 @@ def naive_sample(quad, colors, x, y):
     return z, packed
 
 
-def naive_raster(vertices, lists, tile, columns, width, height, side, warp, box_tests):
+def naive_raster(vertices, lists, tile, columns, width, height, side, warp, box_tests, grid_side=4):
     """Image, depth and events by block, thread by thread."""
     bits = vertices.view(np.uint32)[:, :, 3]
     image = np.zeros((height, width, 3), np.uint8)
@@ -120,8 +120,9 @@ def naive_raster(vertices, lists, tile, columns, width, height, side, warp, box_
         zs = {(s, t): F(1) for s in range(side**2) for t in range(tile**2)}
         packed = dict.fromkeys(zs, 0xFF402020)
         for grid in members:
-            for q in range(9):
-                corners = [q + q // 3 + o for o in (0, 1, 5, 4)]
+            for q in range((grid_side - 1) ** 2):
+                first = q + q // (grid_side - 1)
+                corners = [first + o for o in (0, 1, grid_side + 1, grid_side)]
                 quad = [vertices[grid, k] for k in corners]
                 color = [bits[grid, k] for k in corners]
                 x0, x1 = min(k[0] for k in quad), max(k[0] for k in quad)

@@ -70,6 +70,12 @@ MICROPOLYGON = [
         (8, 4, 1), (16, 4, 1), (32, 4, 1), (8, 4, 4), (8, 4, 16), (8, 8, 1), (16, 8, 1), (16, 8, 4), (8, 2, 1),
     )
 ] + [Variant("micropolygon", "bound 4, fixed function", {"bound": 4, "hybrid": True})]  # fmt: skip
+ROADS = [  # not taken by the papers (experiments/exploration)
+    Variant("micropolygon", "5x5 grids", {"grid": 5, "bound": 16 / 3}),
+    Variant("micropolygon", "7x7 grids", {"grid": 7, "bound": 8}),
+    Variant("micropolygon", "shared vertices", {"shading": "shared"}),
+    Variant("micropolygon", "shading what is visible", {"shading": "visible"}),
+]
 FILTERED = [
     Variant(pipeline, f"{texture_filter} texels", {"texture_filter": texture_filter, **BOTH_SIDES})
     for pipeline, filters in (
@@ -86,4 +92,4 @@ QUICK_PATCHES = MICROPOLYGON
 ALL_TRIANGLES = [
     *HARDWARE, *CUDARASTER, *FREEPIPE, *TILED, *PER_PRIMITIVE, *BINNED, *STAMPS, *ACROSS, *BIT_MASK,
 ]  # fmt: skip
-ALL_PATCHES = [*MICROPOLYGON, *STAMPS, *ACROSS, *BIT_MASK]
+ALL_PATCHES = [*MICROPOLYGON, *ROADS, *STAMPS, *ACROSS, *BIT_MASK]

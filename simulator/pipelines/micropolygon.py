@@ -11,6 +11,7 @@ Modelled
 - Tile raster with and without box tests, with edges computed or loaded, at 1, 4 and 16 samples.
 - Lanes of a warp that want one counter, and requests that queue at the unit of L2 or the lock of DRAM that owns it.
 - A texture over each patch, and cures of cracks that the paper has not (``snap_edges``, ``min_depth``).
+- Roads that the paper leaves for later: larger grids, vertices shared by neighbours, shading after visibility.
 
 Not modelled
 ------------
@@ -21,6 +22,7 @@ Not modelled
 - Displacement, motion blur and transparency, of which the paper has none.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -44,7 +46,11 @@ from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
-from tilestamp.simulator.stages.eisenacher2010.dice import dice
+from tilestamp.simulator.stages.eisenacher2010.dice import GRID_SIDE, Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
+from tilestamp.simulator.stages.eisenacher2010.link_grids import link_grids
+from tilestamp.simulator.stages.eisenacher2010.shade_visible import dice_positions, shade_visible
+from tilestamp.simulator.stages.eisenacher2010.shared_vertices import dice_shared
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import snap_edges
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
@@ -86,14 +92,30 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     snap_edges: bool = False
     """Put the vertices of finer sub-patches on the edges of their coarser neighbours, so that there are no cracks (not
     in the paper). Its look-ups are counted and not priced."""
+    grid: GridSide = 4
+    """Vertices on a side of a grid; with more, a bound that is larger keeps quads as they are (not in the paper)."""
+    shading: Literal["vertices", "shared", "visible"] = "vertices"
+    """Vertices of each grid by itself, each vertex that neighbours share once, or grids that are seen (the last two are
+    not in the paper)."""
     hybrid: bool = False
     """Give the diced grids to the fixed-function rasterizer."""
     texture: NDArray[np.uint8] | None = None
     """Laid over each patch: (H, W, 3 or 4) bytes."""
 
+    def __post_init__(self) -> None:
+        """Refuse what larger grids and late shading do not go with."""
+        super().__post_init__()
+        if self.grid > GRID_SIDE and (self.hybrid or self.snap_edges or self.edges == "loaded"):
+            raise TilestampError("grid: hybrid, snap_edges and loaded edges take grids of 4x4 vertices only")
+        if self.shading != "vertices" and (self.hybrid or self.snap_edges):
+            raise TilestampError("shading: hybrid and snap_edges shade the vertices of each grid by itself")
+        if self.shading == "visible" and (self.spp > 1 or not self.box_tests):
+            raise TilestampError("shading what is visible is written for one sample a pixel, with box tests")
+
     def launches(self, simt: Simt) -> list[Work]:
         """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
-        shape = block_shape(self.tile, self.spp, simt, box_tests=self.box_tests, loaded=self.edges == "loaded")
+        loaded = self.edges == "loaded"
+        shape = block_shape(self.tile, self.spp, simt, box_tests=self.box_tests, loaded=loaded, grid=self.grid)
         return [] if self.hybrid else [raster_work(shape, np.zeros((0, len(TileRasterEvent)), np.int64))]
 
 
@@ -139,7 +161,7 @@ def micropolygon(
         bound_and_split, points, **view, bound=options.bound, bound_rule=options.bound_rule, near=options.near,
         min_depth=options.min_depth,
     ).outputs  # fmt: skip
-    grids = execute(dice, points, subpatches, **view, texture=texture, shaded=execute.picture).outputs
+    grids, shaded = _dice(points, subpatches, view, options, execute)
     if options.snap_edges:
         grids = execute(snap_edges, points, subpatches, grids, simt, textured=texture is not None).outputs.grids
     if options.hybrid:
@@ -148,16 +170,42 @@ def micropolygon(
     count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
     start = execute(bucket_scan, count, simt).outputs
     lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
-    pixels, drawn, _ = execute.last(
+    raster = execute if options.shading == "visible" else execute.last  # what is seen is needed again
+    pixels, drawn, _ = raster(
         tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
         spp=options.spp, box_tests=options.box_tests, edges=options.edges,
+        ids=options.shading == "visible",
     )  # fmt: skip
-    facts = _facts(subpatches, len(lists))
+    image = pixels.image
+    if options.shading == "visible":
+        late: dict[str, Any] = {"side": options.grid, "texture": texture}
+        image, _, shaded = execute(shade_visible, points, subpatches, grids, image, matrix, simt, **late)
+    facts = {**_facts(subpatches, len(lists)), **shaded}
     said = remarks(REMARKS, facts)
     if not execute.picture:
         return Frame.numbers(execute.works, facts, said)
     maps = {} if pixels.overdraw is None else _maps(drawn[0], count, pixels.overdraw, tiles)
-    return Frame(pixels.image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=options.tile)
+    return Frame(image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=options.tile)
+
+
+def _dice(
+    points: NDArray[np.float32],
+    subpatches: SubPatches,
+    view: dict[str, Any],
+    options: MicropolygonOptions,
+    execute: Executor,
+) -> tuple[Grids, Mapping[str, Any]]:
+    """Dice by the way of shading; grids, and how many vertices were shaded."""
+    side = options.grid
+    how: dict[str, Any] = {"texture": options.texture, "shaded": execute.picture}
+    if options.shading == "visible":
+        return execute(dice_positions, points, subpatches, **view, side=side).outputs, {}
+    if options.shading == "shared":
+        links = execute(link_grids, subpatches, view["simt"]).outputs
+        grids, _, facts = execute(dice_shared, points, subpatches, links, **view, **how, side=side)
+        return grids, facts
+    grids = execute(dice, points, subpatches, **view, **how, side=side).outputs
+    return grids, {"shaded_vertices": len(subpatches.patch) * side**2}
 
 
 def _maps(

@@ -33,6 +33,7 @@ from tilestamp.simulator.stages.eisenacher2010.bezier import (
 )
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import BLOCK, VERTICES, dice_work
+from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide, joined, squares
 from tilestamp.simulator.stages.eisenacher2010.shading import (
     MATT,
     NORMAL,
@@ -52,8 +53,8 @@ GRID_SIDE = 4  # vertices
 class Grids(NamedTuple):
     """Diced sub-patches, in the order of the queue."""
 
-    vertices: NDArray[np.float32]  # (N, 16, 4) x, y in pixels, z/w, RGBA8 bits; vertex 4 * row + column
-    boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the 16 vertices
+    vertices: NDArray[np.float32]  # (N, side**2, 4) x, y in pixels, z/w, RGBA8 bits; vertex side * row + column
+    boxes: NDArray[np.float32]  # (N, 4) x0, y0, x1, y1 of the vertices
 
 
 @kernel(lent=True)
@@ -160,6 +161,7 @@ def dice(
     texture: NDArray[np.uint8] | None = None,
     counting: bool = True,
     shaded: bool = True,
+    side: GridSide = 4,
 ) -> StageResult[Grids]:
     """Evaluate and shade a 4x4 grid for each sub-patch.
 
@@ -179,6 +181,8 @@ def dice(
         Without it no works come back.
     shaded : bool
         Without it vertices have no colour: where no picture is wanted.
+    side : int
+        Vertices a side of a grid; more than four the paper has not (``larger_grids``).
 
     Returns
     -------
@@ -194,6 +198,13 @@ def dice(
         texture.ndim == 3 and texture.shape[2] in (3, 4) and texture.size and texture.dtype == np.uint8
     ):
         raise TilestampError(f"texture must be (H, W, 3 or 4) bytes, not {texture.dtype} of shape {texture.shape}")
+    works = (dice_work(subpatches.patch, len(points), texture is not None, simt, side),) if counting else ()
+    if side > GRID_SIDE:
+        cut = squares(subpatches, side)
+        parts = dice(points, cut, matrix, width, height, simt, texture=texture, counting=False, shaded=shaded).outputs
+        vertices = joined(parts.vertices, side)
+        low, high = vertices[:, :, :2].min(axis=1), vertices[:, :, :2].max(axis=1)
+        return StageResult(Grids(vertices, np.concatenate([low, high], axis=1)), works)
     dimensions = 3 if (points[..., 3] == 1).all() else 4
     nets = np.ascontiguousarray(points[..., :dimensions].transpose(0, 2, 1))
     screen = screen_points(points, matrix, width, height)
@@ -217,5 +228,4 @@ def dice(
         colors,
         grids.boxes,
     )
-    works = (dice_work(subpatches.patch, len(points), texture is not None, simt),) if counting else ()
     return StageResult(grids, works)

@@ -11,7 +11,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads, a vertex each: 16 sub-patches
-VERTICES = 16  # of a grid
+VERTICES = 16  # of a grid; control points of a patch
 VERTEX_BYTES = 16
 POINT_BYTES = 16  # a homogeneous control point
 ENTRY_BYTES = 8  # of the patch queue
@@ -19,7 +19,7 @@ BOX_BYTES = 16
 
 
 class DiceEvent(IntEnum):
-    """Events of one block: 16 sub-patches, a thread a vertex."""
+    """Events of one block: 16 sub-patches (fewer of larger grids), a thread a vertex."""
 
     VERTEX_WARPS = 0  # warps that evaluate, shade and store a vertex a lane
     VERTEX_LANES = 1
@@ -34,7 +34,7 @@ class DiceEvent(IntEnum):
 _E = DiceEvent
 
 
-def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt) -> Work:
+def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt, side: int = 4) -> Work:
     """Work of dicing: it depends on which neighbours in the queue share an urPatch, and on how full the last block is.
 
     Parameters
@@ -45,17 +45,21 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
         UrPatches of the scene.
     textured : bool
     simt : Simt
+    side : int
+        Vertices a side of a grid. A block holds as many whole grids as it has threads for; of each grid 16 lanes load
+        the control points, whatever its size.
     """
-    number, per_block = len(patch), BLOCK // VERTICES
+    number, vertices = len(patch), side**2
+    per_block = BLOCK // vertices
     grids = np.minimum(per_block, number - per_block * np.arange(-(-number // per_block)))
     table = np.zeros((len(grids), len(_E)), np.int64)
     table[:, _E.PATCHES] = grids
-    table[:, _E.VERTEX_LANES] = grids * VERTICES
-    table[:, _E.VERTEX_WARPS] = -(-grids * VERTICES // simt.warp)
-    table[:, _E.TEXTURE_LANES] = grids * VERTICES * textured
-    table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = _points(patch, simt)
+    table[:, _E.VERTEX_LANES] = grids * vertices
+    table[:, _E.VERTEX_WARPS] = -(-grids * vertices // simt.warp)
+    table[:, _E.TEXTURE_LANES] = grids * vertices * textured
+    table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = _points(patch, per_block, simt)
     for count in np.unique(grids):
-        queue, stores = _block_traffic(int(count), simt)
+        queue, stores = _block_traffic(int(count), vertices, simt)
         table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] += queue
         table[np.ix_(grids == count, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES])] = stores
     moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
@@ -63,7 +67,7 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
     streams = (
         Stream("queue", "load", entries, entries),
         Stream("points", "load", moved - entries, patches * VERTICES * POINT_BYTES),
-        Stream("grids", "store", stored - boxes, number * VERTICES * VERTEX_BYTES, partial_lines=0),
+        Stream("grids", "store", stored - boxes, number * vertices * VERTEX_BYTES, partial_lines=0),
         Stream("boxes", "store", boxes, boxes, partial_lines=0),
     )
     return Work(
@@ -78,23 +82,24 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
     )
 
 
-def _points(patch: NDArray[np.int32], simt: Simt) -> NDArray[np.int64]:
+def _points(patch: NDArray[np.int32], per_block: int, simt: Simt) -> NDArray[np.int64]:
     """Transactions and bytes of each block's loads of control points, (blocks, 2).
 
     A half-warp reads the 256 bytes of its urPatch. Mostly the rest of its warp reads the same ones: neighbours in the
     queue come from one urPatch. So a warp touches the segments of as many urPatches as it has different ones.
     """
-    per_block, together = BLOCK // VERTICES, max(1, simt.warp // VERTICES)
-    blocks = -(-len(patch) // per_block)
-    padded = np.full(blocks * per_block, -1, np.int64)
-    padded[: len(patch)] = patch
-    warps = np.sort(padded.reshape(blocks * (per_block // together), together), axis=1)
+    together = max(1, simt.warp // VERTICES)
+    blocks, width = -(-len(patch) // per_block), -(-per_block // together) * together
+    padded = np.full((blocks, width), -1, np.int64)
+    block, place = np.divmod(np.arange(len(patch)), per_block)
+    padded[block, place] = patch
+    warps = np.sort(padded.reshape(-1, together), axis=1)
     different = (np.diff(warps, axis=1, prepend=-1) > 0).sum(axis=1)
     cost = np.zeros((together + 1, together + 1, 2), np.int64)
     for grids in range(1, together + 1):
         for patches in range(1, grids + 1):
             cost[grids, patches] = _warp_points(np.minimum(np.arange(grids), patches - 1), simt)
-    by_warp = cost[(warps >= 0).sum(axis=1), different].reshape(blocks, per_block // together, 2)
+    by_warp = cost[(warps >= 0).sum(axis=1), different].reshape(blocks, width // together, 2)
     loads: NDArray[np.int64] = by_warp.sum(axis=1)
     return loads
 
@@ -109,15 +114,15 @@ def _warp_points(patch: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:
     return moved
 
 
-def _block_traffic(grids: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _block_traffic(grids: int, vertices: int, simt: Simt) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Transactions and bytes of a block's loads from the queue, and of its stores."""
     loads, stores = np.zeros(2, np.int64), np.zeros(2, np.int64)
-    for first in range(0, grids * VERTICES, simt.warp):
-        lanes = min(simt.warp, grids * VERTICES - first)
+    for first in range(0, grids * vertices, simt.warp):
+        lanes = min(simt.warp, grids * vertices - first)
         lane = np.arange(first, first + lanes)
-        entry = lane // VERTICES * ENTRY_BYTES
+        entry = lane // vertices * ENTRY_BYTES
         vertex = transactions(lane * VERTEX_BYTES, lanes, VERTEX_BYTES, int(simt.coalescing))
-        box = np.where(lane % VERTICES == 0, lane // VERTICES * BOX_BYTES, -1)
+        box = np.where(lane % vertices == 0, lane // vertices * BOX_BYTES, -1)
         loads += transactions(entry, lanes, ENTRY_BYTES, int(simt.coalescing))
         stores += np.add(vertex, transactions(box, lanes, BOX_BYTES, int(simt.coalescing)))
     return loads, stores

@@ -22,25 +22,25 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import divisible
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
+    ALIGNMENTS,
     EDGE_VECTORS,
     SEGMENT_WORDS,
     VECTOR_BYTES,
-    VERTICES,
     WORD_BYTES,
     BlockShape,
     TileRasterEvent,
-    block_shape,
     block_traffic,
     box_warps,
     count_block,
     count_stores,
+    grids_together,
+    shape_for,
 )
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_known import known_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
     FAR,
-    QUADS,
     Samples,
     quad_box,
     sample_quad,
@@ -60,9 +60,11 @@ def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: Bloc
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
     left, top = origin
-    for quad in range(QUADS):
-        v = quad + quad // 3
-        x0, y0, x1, y1 = quad_box(vertices, grid, v)
+    quads, v, column = shape.grid - 1, -1, 0  # quads a row; the first vertex of the quad, its column
+    for _ in range(quads * quads):
+        v += 1 + (column == quads)
+        column = 1 if column == quads else column + 1
+        x0, y0, x1, y1 = quad_box(vertices, grid, v, shape.grid)
         if x1 < left or x0 > left + tile or y1 < top or y0 > top + tile:
             continue
         i0, i1 = sample_span(x0, x1, left, side, tile * side)
@@ -104,6 +106,7 @@ def _raster_tiles(
     image: Any,
     depth: Any,
     overdraw: Any,
+    ids: Any,
     table: Any,
 ) -> None:
     """One part of the tiles ``drawn``; row i of the table is that of the i-th of them."""
@@ -125,6 +128,9 @@ def _raster_tiles(
         for k in range(first, first + grids):
             _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
         resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
+        if ids is not None:
+            y, x = tile_row * shape.tile, column * shape.tile
+            ids[y : y + size, x : x + size] = samples.color[: height - y, : width - x]
         if row is not None:
             count_block(block, lists, first, grids, shape, traffic, row)
             count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, stores, row)
@@ -133,17 +139,16 @@ def _raster_tiles(
 class Pixels(NamedTuple):
     """What the tiles show; of tiles that were not drawn it means nothing."""
 
-    image: NDArray[np.uint8]  # (H, W, 3)
+    image: NDArray[Any]  # (H, W, 3) bytes; with ``ids`` the number of the first vertex of each quad seen, (H, W) uint32
     depth: NDArray[np.float32]  # (H, W) of the nearest sample of each pixel; 1 where nothing was drawn
     overdraw: NDArray[np.int32] | None  # (H, W) quads that cover a sample, summed over the samples of each pixel
 
 
 def shared_bytes(shape: BlockShape) -> int:
     """Shared memory a block: a batch of grids, their edge equations if loaded, all samples where they are resolved."""
-    threads = shape.tile**2
-    grids = threads // VERTICES
-    samples = threads * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
-    return grids * (VERTICES + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
+    grids: int = grids_together(shape)
+    samples = shape.tile**2 * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
+    return grids * (shape.grid**2 + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
 
 
 def _streams(
@@ -157,12 +162,12 @@ def _streams(
     seen = np.zeros(grids, np.bool_)
     seen[lists] = True
     drawn = int(np.count_nonzero(seen))
-    vertex_bytes = int(total[_E.GRIDS]) * block_traffic(shape, simt).grid_bytes
-    edge_bytes = int(total[_E.GRIDS]) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
+    vertex_bytes = int(block_traffic(shape, simt).grid[lists % ALIGNMENTS, 1].sum())
+    edge_bytes = len(lists) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
     stored, row = int(total[_E.STORE_BYTES]), max(SECTOR_BYTES, shape.tile * WORD_BYTES)
     streams = [
-        Stream("grids", "load", vertex_bytes, drawn * VERTICES * VECTOR_BYTES, 2 * vertex_bytes // rows),
+        Stream("grids", "load", vertex_bytes, drawn * shape.grid**2 * VECTOR_BYTES, 2 * vertex_bytes // rows),
         Stream("LISTS", "load", rest, len(lists) * WORD_BYTES + 2 * len(table) * WORD_BYTES),
         Stream("framebuffer", "store", stored, stored, partial_lines=0 if row >= LINE_BYTES else stored // row),
     ]
@@ -181,20 +186,22 @@ def _work(
     spp: int,
     box_tests: bool,
     edges: str,
+    ids: bool,
     **_: Any,
 ) -> Work:
     """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
-    shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
-    return raster_work(
-        shape, table, _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
-    )
+    shape = shape_for(vertices, tiles, simt, spp=spp, box_tests=box_tests, edges=edges)
+    streams = _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
+    return raster_work(shape, table, streams, ids=ids)
 
 
-def raster_work(shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = ()) -> Work:
-    """Work of the kernel, a row a tile."""
+def raster_work(
+    shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = (), *, ids: bool = False
+) -> Work:
+    """Work of the kernel, a row a tile; ``ids`` where it leaves numbers of quads in place of colours."""
     return Work(
         stage="tile_raster",
-        kernel="tile_raster",
+        kernel="tile_raster" + "_ids" * ids,
         events=_E,
         table=table,
         grid=len(table),
@@ -219,6 +226,7 @@ def tile_raster(
     spp: int = 1,
     box_tests: bool = True,
     edges: Edges = "computed",
+    ids: bool = False,
     counting: bool = True,
     units: NDArray[np.int64] | None = None,
 ) -> tuple[Pixels, NDArray[np.int64] | None]:
@@ -226,8 +234,9 @@ def tile_raster(
 
     Parameters
     ----------
-    vertices : ndarray, (N, 16, 4), float32
-        Screen x and y (pixels, y down), z (smaller is nearer), and the packed colour's bits, of 4x4 vertices a grid.
+    vertices : ndarray, (N, side**2, 4), float32
+        Screen x and y (pixels, y down), z (smaller is nearer), and the packed colour's bits, of 4x4 vertices a grid
+        (or of more, which the paper has not).
     count, start : ndarray, (tiles,), uint32
         COUNT and START.
     lists : ndarray, uint32
@@ -242,6 +251,8 @@ def tile_raster(
         Test a quad's box against sub-tiles and samples before the edge functions.
     edges : {"computed", "loaded"}
         Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture.
+    ids : bool
+        Leave the number of the quad that is seen in place of its colour (not in the paper); one sample a pixel.
     counting : bool
         Without it no events are counted and no works come back.
     units : ndarray, int64, optional
@@ -259,15 +270,16 @@ def tile_raster(
     """
     if simt.warp < SMALLEST_WARP or simt.warp.bit_count() > 1:
         raise TilestampError(f"tile_raster needs warps of 16, 32 or 64 lanes, not {simt.warp}")
-    shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+    shape = shape_for(vertices, tiles, simt, spp=spp, box_tests=box_tests, edges=edges)
     image = np.empty((height, width, 3), np.uint8)
     depth = np.empty((height, width), np.float32)
     overdraw = np.empty((height, width), np.int32) if counting else None
     blocks = np.arange(tiles.total) if units is None else units
     table = np.zeros((len(blocks), len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
-    colors = vertices.view(np.uint32)[:, :, 3]
-    buffers = (image, depth, overdraw, table)
+    colors = None if ids else vertices.view(np.uint32)[:, :, 3]
+    seen = np.full((height, width), BACKGROUND, np.uint32) if ids else None
+    buffers = (image, depth, overdraw, seen, table)
     parts = parts_of(len(blocks), _PART_TILES)
     for_parts(_raster_tiles, parts, blocks, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
-    return Pixels(image, depth, overdraw), table
+    return Pixels(image if seen is None else seen, depth, overdraw), table

@@ -4,6 +4,7 @@ A block reads its list of grids in batches, as many as it has threads for (16 ve
 quads of a batch with all its warps.
 """
 
+import math
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -15,16 +16,17 @@ from tilestamp.models.coalescing import SEGMENT_BYTES, contiguous, transactions
 from tilestamp.models.counters import distribution, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing, Simt
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve_replays
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import QUADS
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import GRID_SIDE, QUADS
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
-VERTICES = 16  # a grid
+HALF_WARP = 16  # lanes that load the edges of a grid together
 VECTOR_BYTES = 16  # a vertex; and the width of a load
 VECTOR_WORDS = 4
 WORD_BYTES = 4
 EDGE_VECTORS = 27  # a grid: 12 floats a quad, where edge equations are loaded
-EDGE_ALIGNMENTS = 8  # ways in which 432 bytes lie in 128-byte segments
+ALIGNMENTS = 8  # ways in which a number of vectors lie in 128-byte segments
 SEGMENT_WORDS = SEGMENT_BYTES // WORD_BYTES  # places in a segment where the pixels of a tile may begin
 BROADCAST_LOADS = 4  # vertices that each lane reads for a quad
 EDGE_LOADS = 3  # vectors that each lane reads for the edges of a quad
@@ -40,7 +42,7 @@ class TileRasterEvent(IntEnum):
 
     PIXEL_WARPS = 0  # start and end of the kernel
     PIXEL_LANES = 1
-    GRIDS = 2  # grids in the tile's list
+    GRIDS = 2  # grids in the tile's list; larger ones as so many of 9 quads
     BATCHES = 3  # times that the block fills its shared memory with grids
     BATCH_WARPS = 4
     GATHER_WARPS = 5  # warps that load an index and a vertex a lane, and leave the vertex in shared memory
@@ -90,43 +92,67 @@ class BlockShape(NamedTuple):
     coalescing: int
     box_tests: bool
     loaded: bool  # edge equations are loaded
+    grid: int = GRID_SIDE  # vertices a side
 
 
 class BlockTraffic(NamedTuple):
     """Memory traffic that is alike in all blocks."""
 
-    grid_transactions: int  # vertices of one grid
-    grid_bytes: int
+    grid: NDArray[np.int64]  # transactions and bytes of one grid's vertices, by its alignment
     edges: NDArray[np.int64]  # transactions and bytes of one grid's edge equations, by its alignment
     gather_replays: int  # shared store of a full warp of vectors
     resolve_replays: int  # of a block
 
 
-def block_shape(tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool) -> BlockShape:
-    """Shape of a block of ``tile**2`` threads."""
+def block_shape(tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool, grid: int = GRID_SIDE) -> BlockShape:
+    """Shape of a block of ``tile**2`` threads, for grids of ``grid`` vertices a side."""
     side = {1: 1, 4: 2, 16: 4}[spp]
     bits = simt.warp.bit_length() - 1
     warps = -(-tile * tile // simt.warp)
     return BlockShape(
-        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests, loaded
-    )
+        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests, loaded,
+        grid,
+    )  # fmt: skip
+
+
+def shape_for(
+    vertices: NDArray[np.float32], tiles: Tiles, simt: Simt, *, spp: int, box_tests: bool, edges: str
+) -> BlockShape:
+    """Shape of the blocks that draw these grids."""
+    side = math.isqrt(vertices.shape[1])
+    return block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded", grid=side)
 
 
 def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     """Count what is alike in all blocks."""
-    lanes = np.arange(VERTICES, dtype=np.int64) * VECTOR_BYTES
-    edges = np.zeros((EDGE_ALIGNMENTS, 2), np.int64)
-    for grid in range(EDGE_ALIGNMENTS):
-        base = grid * EDGE_VECTORS * VECTOR_BYTES
-        edges[grid] += transactions(lanes + base, VERTICES, VECTOR_BYTES, shape.coalescing)
-        base += VERTICES * VECTOR_BYTES
-        edges[grid] += transactions(lanes + base, EDGE_VECTORS - VERTICES, VECTOR_BYTES, shape.coalescing)
+    edges = np.zeros((ALIGNMENTS, 2), np.int64)
+    for place in range(ALIGNMENTS):
+        base = place * EDGE_VECTORS * VECTOR_BYTES
+        for first, count in ((0, HALF_WARP), (HALF_WARP, EDGE_VECTORS - HALF_WARP)):
+            address = (np.arange(count, dtype=np.int64) + first) * VECTOR_BYTES + base
+            edges[place] += transactions(address, count, VECTOR_BYTES, shape.coalescing)
     full = min(shape.warp, shape.tile**2)
     shared = Simt(*map(int, simt))  # one type for the compiler
     gather = bank_passes(np.arange(full) * VECTOR_WORDS, full, shared, VECTOR_WORDS) - -(-full // simt.bank_lanes)
     resolved = resolve_replays(shape.tile, shape.side, shared) if shape.side > 1 else 0
-    grid = transactions(lanes, VERTICES, VECTOR_BYTES, shape.coalescing)
-    return BlockTraffic(int(grid[0]), int(grid[1]), edges, gather, resolved)
+    return BlockTraffic(_vectors(shape.grid**2, shape), edges, gather, resolved)
+
+
+def _vectors(count: int, shape: BlockShape) -> NDArray[np.int64]:
+    """Transactions and bytes of ``count`` vectors in a row that lanes load together, by the alignment of the first."""
+    moved = np.zeros((ALIGNMENTS, 2), np.int64)
+    for place in range(ALIGNMENTS):
+        address = (np.arange(count, dtype=np.int64) + place * count) * VECTOR_BYTES
+        for first in range(0, count, shape.warp):
+            lanes = min(shape.warp, count - first)
+            moved[place] += transactions(address[first:], lanes, VECTOR_BYTES, shape.coalescing)
+    return moved
+
+
+@kernel(lent=True)
+def grids_together(shape: BlockShape) -> int:
+    """Grids of one batch: a vertex a thread, but one whole grid at least."""
+    return max(1, shape.tile * shape.tile // (shape.grid * shape.grid))
 
 
 @kernel(lent=True)
@@ -145,13 +171,13 @@ def count_block(
 ) -> None:
     """Add the events that depend on the length of the list only, and the memory traffic of loads."""
     threads = shape.tile * shape.tile
-    batch = threads // VERTICES
-    quads = grids * QUADS
+    batch = grids_together(shape)
+    quads = grids * (shape.grid - 1) * (shape.grid - 1)
     subtiles = shape.side * shape.side
     row[_E.PIXEL_WARPS] = row[_E.RESOLVE_WARPS] = shape.warps
     row[_E.PIXEL_LANES] = threads
     row[_E.LIST_WARPS] = shape.warps if grids > 0 else 0
-    row[_E.GRIDS] = grids
+    row[_E.GRIDS] = (quads + QUADS - 1) // QUADS
     row[_E.BATCHES] = (grids + batch - 1) // batch
     row[_E.BATCH_WARPS] = row[_E.BATCHES] * shape.warps
     row[_E.QUAD_WARPS] = quads * shape.warps
@@ -188,18 +214,19 @@ def _count_loads(
     block: Any, lists: Any, first: int, grids: int, shape: BlockShape, traffic: BlockTraffic, row: Any
 ) -> None:
     """COUNT by every warp, START if there are grids; then an index for 16 lanes, a grid and its edges by the same."""
-    together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // VERTICES)  # grids an instruction
-    requests = shape.warps * (max(1, shape.warp // VERTICES) if shape.coalescing == _HALF_WARP else 1)
+    vertices = shape.grid * shape.grid
+    together = 1 if shape.coalescing == _HALF_WARP else max(1, shape.warp // vertices)  # grids an instruction
+    requests = shape.warps * (max(1, shape.warp // HALF_WARP) if shape.coalescing == _HALF_WARP else 1)
     count, size = contiguous(block * WORD_BYTES, WORD_BYTES, shape.coalescing)
     words = 2 if grids > 0 else 1
     row[_E.LOAD_TRANSACTIONS] += words * requests * count
     row[_E.LOAD_BYTES] += words * requests * size
-    batch = shape.tile * shape.tile // VERTICES
+    batch = grids_together(shape)
     for base in range(0, grids, batch):
         loaded = min(batch, grids - base)
-        warps = (loaded * VERTICES + shape.warp - 1) // shape.warp
+        warps = (loaded * vertices + shape.warp - 1) // shape.warp
         row[_E.GATHER_WARPS] += warps
-        row[_E.GATHER_LANES] += loaded * VERTICES
+        row[_E.GATHER_LANES] += loaded * vertices
         for i in range(base, base + loaded, together):
             indices = min(together, base + loaded - i)
             count, size = contiguous((first + i) * WORD_BYTES, indices * WORD_BYTES, shape.coalescing)
@@ -209,10 +236,11 @@ def _count_loads(
             row[_E.EDGE_GATHER_WARPS] += 2 * warps
             row[_E.EDGE_GATHER_LANES] += loaded * EDGE_VECTORS
             for i in range(base, base + loaded):
-                row[_E.LOAD_TRANSACTIONS] += traffic.edges[lists[first + i] % EDGE_ALIGNMENTS, 0]
-                row[_E.LOAD_BYTES] += traffic.edges[lists[first + i] % EDGE_ALIGNMENTS, 1]
-    row[_E.LOAD_TRANSACTIONS] += grids * traffic.grid_transactions
-    row[_E.LOAD_BYTES] += grids * traffic.grid_bytes
+                row[_E.LOAD_TRANSACTIONS] += traffic.edges[lists[first + i] % ALIGNMENTS, 0]
+                row[_E.LOAD_BYTES] += traffic.edges[lists[first + i] % ALIGNMENTS, 1]
+    for i in range(first, first + grids):
+        row[_E.LOAD_TRANSACTIONS] += traffic.grid[lists[i] % ALIGNMENTS, 0]
+        row[_E.LOAD_BYTES] += traffic.grid[lists[i] % ALIGNMENTS, 1]
 
 
 @kernel(lent=True)

@@ -19,10 +19,10 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     SEGMENT_WORDS,
     BlockShape,
     TileRasterEvent,
-    block_shape,
     block_traffic,
     count_block,
     count_stores,
+    shape_for,
 )
 
 SAMPLE_SECONDS, ENTRY_SECONDS = 40e-9, 0.4e-6  # CPU time of a sample, and of an entry of a list
@@ -38,14 +38,15 @@ LISTED = (  # events that follow from the lists
 
 @kernel(lent=True)
 def _add_grids(
-    part: int, parts: int, vertices: Any, count: Any, start: Any, lists: Any, tiles: Tiles, known: Any
+    part: int, parts: int, vertices: Any, side: int, count: Any, start: Any, lists: Any, tiles: Tiles, known: Any
 ) -> None:
     """Pixels of boxes and of grids in each tile of one part; a grid's area is that of its two triangles."""
     for t in range(count.size * part // parts, count.size * (part + 1) // parts):
         left, top = np.float32(t % tiles.columns * tiles.size), np.float32(t // tiles.columns * tiles.size)
         for k in range(np.int64(start[t]), np.int64(start[t]) + np.int64(count[t])):
             v = vertices[lists[k]]
-            ax, ay, bx, by, cx, cy, dx, dy = v[0, 0], v[0, 1], v[3, 0], v[3, 1], v[12, 0], v[12, 1], v[15, 0], v[15, 1]
+            ax, ay, bx, by = v[0, 0], v[0, 1], v[side - 1, 0], v[side - 1, 1]
+            cx, cy, dx, dy = v[-side, 0], v[-side, 1], v[-1, 0], v[-1, 1]
             x0, x1 = min(ax, bx, cx, dx), max(ax, bx, cx, dx)
             y0, y1 = min(ay, by, cy, dy), max(ay, by, cy, dy)
             along = max(min(x1, left + tiles.size) - max(x0, left), np.float32(0))
@@ -82,12 +83,13 @@ def known_tiles(
     spp: int,
     box_tests: bool,
     edges: str,
+    **_: Any,
 ) -> Known:
     """What is known of each tile; inputs of ``tile_raster``."""
     pixels, rows = np.zeros((2, tiles.total)), np.zeros((tiles.total, len(TileRasterEvent)), np.int64)
-    shape = block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded")
+    shape = shape_for(vertices, tiles, simt, spp=spp, box_tests=box_tests, edges=edges)
     parts, listed = parts_of(tiles.total, _PART_TILES), (count, start, lists, tiles)
-    for_parts(_add_grids, parts, vertices, *listed, pixels)
+    for_parts(_add_grids, parts, vertices, shape.grid, *listed, pixels)
     for_parts(_count_lists, parts, *listed, shape, block_traffic(shape, simt), (width, height), rows)
     seconds = SAMPLE_SECONDS * width * height * spp + ENTRY_SECONDS * len(lists)
     return Known(seconds, count, (pixels[1], pixels[0]), {event: rows[:, event] for event in LISTED})

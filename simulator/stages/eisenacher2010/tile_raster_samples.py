@@ -46,10 +46,11 @@ def blend(a: Any, b: Any, c: Any, u: Any, v: Any, w: Any) -> Any:
 
 
 @kernel(lent=True)
-def quad_box(vertices: Any, grid: int, v: int) -> tuple[Any, Any, Any, Any]:
-    """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``."""
-    ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, v + 1, 0], vertices[grid, v + 5, 0], vertices[grid, v + 4, 0]
-    ay, by, cy, dy = vertices[grid, v, 1], vertices[grid, v + 1, 1], vertices[grid, v + 5, 1], vertices[grid, v + 4, 1]
+def quad_box(vertices: Any, grid: int, v: int, side: int) -> tuple[Any, Any, Any, Any]:
+    """Bounding box x0, y0, x1, y1 of the quad whose first vertex is ``v``, in a grid of ``side`` vertices a side."""
+    b, d = v + 1, v + side
+    ax, bx, cx, dx = vertices[grid, v, 0], vertices[grid, b, 0], vertices[grid, d + 1, 0], vertices[grid, d, 0]
+    ay, by, cy, dy = vertices[grid, v, 1], vertices[grid, b, 1], vertices[grid, d + 1, 1], vertices[grid, d, 1]
     x0, x1 = min(ax, bx, cx, dx), max(ax, bx, cx, dx)
     y0, y1 = min(ay, by, cy, dy), max(ay, by, cy, dy)
     return x0, y0, x1, y1
@@ -72,15 +73,12 @@ def sample_quad(
 ) -> tuple[int, int, int, int]:
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 
+    Of a sample that is kept the blended colour stays, or the number of the quad's first vertex where no ``colors`` are.
     Returns the warps and lanes that cover a sample, and those that pass the z-test; 0 where ``row`` is None.
     """
-    ax, ay, bx, by = vertices[grid, v, 0], vertices[grid, v, 1], vertices[grid, v + 1, 0], vertices[grid, v + 1, 1]
-    cx, cy, dx, dy = (
-        vertices[grid, v + 5, 0],
-        vertices[grid, v + 5, 1],
-        vertices[grid, v + 4, 0],
-        vertices[grid, v + 4, 1],
-    )
+    b, c, d = v + 1, v + shape.grid + 1, v + shape.grid
+    ax, ay, bx, by = vertices[grid, v, 0], vertices[grid, v, 1], vertices[grid, b, 0], vertices[grid, b, 1]
+    cx, cy, dx, dy = vertices[grid, c, 0], vertices[grid, c, 1], vertices[grid, d, 0], vertices[grid, d, 1]
     step = _ONE / np.float32(shape.side)
     mask = shape.tile - 1
     hits = hit_warps = passed = passed_warps = 0
@@ -106,19 +104,22 @@ def sample_quad(
                 hit_warp = of_warp
             f = edge(ax, ay, cx, cy, x, y)
             if (f <= _ZERO) == (e0 + e1 + e2 + e3 >= _ZERO):  # which side of the diagonal
-                p, wa, wb, wc = v + 1, e1, -f, e0
+                p, wa, wb, wc = b, e1, -f, e0
             else:
-                p, wa, wb, wc = v + 4, e2, f, e3
+                p, wa, wb, wc = d, e2, f, e3
             total = wa + wb + wc
             if total == _ZERO:
                 continue
             r = _ONE / total
-            z = (wa * vertices[grid, v, 2] + wb * vertices[grid, p, 2] + wc * vertices[grid, v + 5, 2]) * r
+            z = (wa * vertices[grid, v, 2] + wb * vertices[grid, p, 2] + wc * vertices[grid, c, 2]) * r
             if z < samples.depth[j, i]:
                 samples.depth[j, i] = z
-                samples.color[j, i] = blend(
-                    colors[grid, v], colors[grid, p], colors[grid, v + 5], wa * r, wb * r, wc * r
-                )
+                if colors is None:
+                    samples.color[j, i] = grid * shape.grid * shape.grid + v
+                else:
+                    samples.color[j, i] = blend(
+                        colors[grid, v], colors[grid, p], colors[grid, c], wa * r, wb * r, wc * r
+                    )
                 if row is not None:
                     of_warp = ((j & mask) * shape.tile + (i & mask)) >> shape.warp_bits
                     passed_warps += of_warp != passed_warp
