@@ -215,9 +215,9 @@ def test_lanes_on_one_pixel_take_turns_and_lanes_apart_do_not():
     [
         ({"blend": "screen"}, "MODULE:NAME"),
         ({"blend": "nowhere:screen"}, "nowhere"),
-        ({"blend": "max", "mode": "depth"}, "only mode blend"),
-        ({"blend": "max", "msaa": 4}, "only mode blend"),
-        ({"blend": "max", "batches": 2}, "only mode blend"),
+        ({"blend": "max", "mode": "depth"}, "alone have them"),
+        ({"blend": "max", "msaa": 4}, "alone have them"),
+        ({"blend": "max", "batches": 2}, "alone have them"),
     ],
 )
 def test_what_it_does_not_take(options, said):

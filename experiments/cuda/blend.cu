@@ -21,10 +21,14 @@ static __device__ __forceinline__ u32 random_word(u32 w) {
   return w ^ (w >> 15);
 }
 
-struct Over {
+struct Blend {
+  static __device__ u32 left(u32) { return 0; }  // what the lane keeps of its fragment
+};
+
+struct Over : Blend {
   static __device__ void run(Words w, int p, u32 c, u32, u32, int) { w[p] = over(c, w[p]); }
 };
-struct Additive {
+struct Additive : Blend {
   static __device__ void run(Words w, int p, u32 c, u32, u32, int) {
     u32 d = w[p], a = c >> 24, r = 0;
 #pragma unroll
@@ -32,10 +36,10 @@ struct Additive {
     w[p] = r;
   }
 };
-struct Max {
+struct Max : Blend {
   static __device__ void run(Words w, int p, u32 c, u32, u32, int) { w[p] = __vmaxu4(c, w[p]); }
 };
-struct Multiply {
+struct Multiply : Blend {
   static __device__ void run(Words w, int p, u32 c, u32, u32, int) {
     u32 d = w[p], r = 0;
 #pragma unroll
@@ -43,12 +47,12 @@ struct Multiply {
     w[p] = r;
   }
 };
-struct Nearest {
+struct Nearest : Blend {
   static __device__ void run(Words w, int p, u32 c, u32 z, u32, int) {
     if (z < w[64 + p]) { w[64 + p] = z; w[p] = c; }
   }
 };
-struct KBuffer {
+struct KBuffer : Blend {
   static __device__ void run(Words w, int p, u32 c, u32 z, u32, int n) {
 #pragma unroll 1
     for (int i = 1; i < n; i += 2) {
@@ -62,7 +66,7 @@ struct KBuffer {
     if (z != ~0u) w[p] = over(c, w[p]);
   }
 };
-struct Stochastic {
+struct Stochastic : Blend {
   static __device__ void run(Words w, int p, u32 c, u32 z, u32 key, int n) {
 #pragma unroll 1
     for (int i = 0; i < n; i += 2) {
@@ -73,6 +77,15 @@ struct Stochastic {
       }
     }
   }
+};
+
+struct Linked {  // the head of the pixel's list: the node's link is what was there
+  static __device__ void run(Words w, int p, u32& c, u32 node, u32, int) { c = w[p]; w[p] = node; }
+  static __device__ u32 left(u32 c) { return c; }
+};
+struct Fixed {  // how many there are: the fragment's place
+  static __device__ void run(Words w, int p, u32& c, u32, u32, int) { c = w[p]; w[p] = c + 1; }
+  static __device__ u32 left(u32 c) { return c; }
 };
 
 template <class Program> __global__ void rop(const uint4* fragments, u32* out, int n) {
@@ -92,7 +105,7 @@ template <class Program> __global__ void rop(const uint4* fragments, u32* out, i
     }
     __syncwarp();
   }
-  out[threadIdx.x] = word[threadIdx.x];
+  out[threadIdx.x] = word[threadIdx.x] + Program::left(f.y);
 }
 template __global__ void rop<Over>(const uint4*, u32*, int);
 template __global__ void rop<Additive>(const uint4*, u32*, int);
@@ -101,6 +114,8 @@ template __global__ void rop<Multiply>(const uint4*, u32*, int);
 template __global__ void rop<Nearest>(const uint4*, u32*, int);
 template __global__ void rop<KBuffer>(const uint4*, u32*, int);
 template __global__ void rop<Stochastic>(const uint4*, u32*, int);
+template __global__ void rop<Linked>(const uint4*, u32*, int);
+template __global__ void rop<Fixed>(const uint4*, u32*, int);
 
 extern "C" __global__ void resolve_k_buffer(u32* out, int n) {
   int p = threadIdx.x;
@@ -123,3 +138,33 @@ extern "C" __global__ void resolve_stochastic(u32* out, int n) {
   out[p] = (u32)((even & 0xffff) * s + 0.5f) | (u32)((even >> 16) * s + 0.5f) << 16 |
            (u32)((odd & 0xffff) * s + 0.5f) << 8 | (u32)((odd >> 16) * s + 0.5f) << 24;
 }
+
+static const int LONGEST = 64;  // fragments that local memory has room for
+template <bool fixed> __global__ void resolve_lists(const u32* heads, const uint2* nodes, const u32* links, u32* out,
+                                                    int room, int row) {
+  int at = blockIdx.x * blockDim.x + threadIdx.x, n = 0;
+  u32 head = heads[at], here = fixed ? (at >> 6) * room * 64 + (at & 63) : head;
+  uint2 kept[LONGEST];
+#pragma unroll 1
+  while (fixed ? n < (int)head : here != ~0u) {
+    uint2 f = nodes[here];
+    int i = n++;
+    here = fixed ? here + 64 : links[here];
+#pragma unroll 1
+    for (; i > 0 && (fixed ? kept[i - 1].y < f.y : kept[i - 1].y <= f.y); i--) kept[i] = kept[i - 1];
+    kept[i] = f;
+  }
+  float r = 0, g = 0, b = 0, a = 0;
+#pragma unroll 1
+  for (int i = 0; i < n; i++) {
+    u32 c = kept[i].x;
+    float alpha = (c >> 24) * (1.0f / 255);
+    r += alpha * ((c & 255) - r);
+    g += alpha * (((c >> 8) & 255) - g);
+    b += alpha * (((c >> 16) & 255) - b);
+    a += alpha * ((c >> 24) - a);
+  }
+  out[(at >> 6) * row + (at & 63)] = (u32)(r + 0.5f) | (u32)(g + 0.5f) << 8 | (u32)(b + 0.5f) << 16 | (u32)(a + 0.5f) << 24;
+}
+template __global__ void resolve_lists<false>(const u32*, const uint2*, const u32*, u32*, int, int);
+template __global__ void resolve_lists<true>(const u32*, const uint2*, const u32*, u32*, int, int);

@@ -10,7 +10,8 @@ from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSe
 from tilestamp.simulator.work import Work
 
 REMARKS = {
-    "retries": "{:,} attempts of a first frame fail for want of room in a queue (-O first_frame=True prices them)"
+    "retries": "{:,} attempts of a first frame fail for want of room in a queue (-O first_frame=True prices them)",
+    "fragments_lost": "{:,} fragments found no room in the list of their pixel, and are missing",
 }
 Counters = dict[str, tuple[int, int]]  # numerator and denominator by the profiler's own name
 

@@ -8,7 +8,7 @@ Modelled
 - All four kernels of both releases to the bit: queues, segments, input order, clipping, snapping, pictures,
   counters.
 - Batches, samples (1 to 8), four modes, and attempts that fail because a queue is too short (``first_frame``).
-- A program in the ROP (``blend``), a user's function too.
+- A program in the ROP (``blend``), a user's function too; lists of fragments that are blended by depth (``lists``).
 - What nvdiffrast's copy of the parameters to local memory costs (``copy_parameters``).
 
 Not modelled
@@ -19,6 +19,7 @@ Not modelled
 - Copies between host and GPU.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -42,6 +43,7 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
     setup_counters,
 )
 from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
+from tilestamp.simulator.pipelines._cudaraster_rop import draw_by, reads_depth
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
@@ -50,7 +52,6 @@ from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
 from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
-from tilestamp.simulator.stages.laine2011.programmable_rop import needs_depth, programmable_rop
 from tilestamp.simulator.stages.laine2011.triangle_setup import (
     MAX_SUBTRIANGLES,
     SLACK,
@@ -91,6 +92,11 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     Numba function of yours (``tilestamp.simulator.stages.laine2011.blend_programs``)."""
     layers: Annotated[int, Meta(ge=1, le=32)] = 4
     """Fragments that a k-buffer keeps of a pixel; samples of stochastic transparency."""
+    lists: Literal["none", "linked", "round", "chunked", "fixed"] = "none"
+    """Mode blend: keep all fragments, and blend them by depth in a kernel of its own. Nodes linked with an atomic each,
+    one for a round of 32 or one for a chunk; or a fixed number of places a pixel."""
+    room: Annotated[int, Meta(ge=1, le=1024)] = 32
+    """Nodes of a chunk, or fixed places of a pixel."""
     batches: Annotated[int, Meta(ge=1, le=1024)] = 1
     """Draws that the triangles are divided among; the first clears."""
     copy_parameters: bool = False
@@ -108,14 +114,18 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
         if self.blend not in BUILT_IN:
             find_program(self.blend)
         if self.programmable and (self.mode != "blend" or self.msaa != 1 or self.batches != 1):
-            raise TilestampError(f"blend {self.blend}: only mode blend, with msaa 1 and batches 1, has other programs")
+            raise TilestampError(
+                f"blend {self.blend}, lists {self.lists}: mode blend, msaa 1 and batches 1 alone have them"
+            )
+        if self.lists != "none" and self.blend != BUILT_IN[0]:
+            raise TilestampError(f"lists {self.lists}: they are blended over, not by {self.blend}")
         if self.copy_parameters and self.release != "nvdiffrast":
             raise TilestampError(f"copy_parameters: release {self.release} does not copy them; nvdiffrast does")
 
     @property
     def programmable(self) -> bool:
-        """Whether the ROP runs a program."""
-        return self.blend != BUILT_IN[0]
+        """Whether the ROP runs a program, or keeps lists."""
+        return self.blend != BUILT_IN[0] or self.lists != "none"
 
 
 @dataclass
@@ -130,6 +140,7 @@ class _State:
     capacity: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     needed: dict[str, int] = field(default_factory=lambda: {"numSubtris": 0, "numBinSegs": 0, "numTileSegs": 0})
     retries: int = 0
+    facts: Mapping[str, Any] = field(default_factory=dict)  # of a ROP that is not the published one
     buffers: FrameBuffers | None = None
     counters: Counters = field(default_factory=dict)
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -180,7 +191,7 @@ def cudaraster(
         _draw(state, positions, mesh.triangles[first:last], first)
     copied = COPYING if options.copy_parameters else ()
     works = [with_parameter_copy(work) if work.kernel in copied else work for work in execute.works]
-    facts = frame_facts(state.counters, state.needed, options.release, state.retries)
+    facts = frame_facts(state.counters, state.needed, options.release, state.retries) | dict(state.facts)
     if not execute.picture:
         return Frame.numbers(works, facts, remarks(REMARKS, facts))
     assert state.buffers is not None  # noqa: S101 - there is at least one batch
@@ -207,7 +218,7 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     """
     options, execute, (width, height) = state.options, state.execute, state.size
     depth, _, _, interpolate = MODES[options.mode]
-    planes = depth or (options.programmable and needs_depth(options.blend))
+    planes = depth or (options.programmable and reads_depth(options.blend, options.lists))
     shape: dict[str, Any] = {"width": width, "height": height, "simt": state.simt, "release": options.release}
     _initial_capacity(state, len(triangles))
     clear = state.buffers is None
@@ -237,16 +248,19 @@ def _draw(state: _State, positions: NDArray[np.float32], triangles: NDArray[np.i
     tile_maps(state.maps, lists, drawn[0] if execute.counting else None)
 
 
-def _draw_tiles(state: _State, setup: Setup, lists: TileQueues) -> tuple[FrameBuffers, tuple[Work, ...]]:
-    """Fine raster, as published or with a program in its ROP."""
-    options, execute = state.options, state.execute
-    inputs = setup, lists.starts, lists.entries, lists.active, *state.size, state.simt
+def _draw_tiles(state: _State, setup: Setup, queues: TileQueues) -> tuple[FrameBuffers, tuple[Work, ...]]:
+    """Fine raster, with its own ROP or another."""
+    options, execute, (width, height) = state.options, state.execute, state.size
     if options.programmable:
         assert state.colors is not None  # noqa: S101 - made where there is a program
-        return execute(programmable_rop, *inputs, program=options.blend, layers=options.layers, colors=state.colors)[:2]
+        buffers, works, state.facts = draw_by(
+            execute, setup, queues, state.size, state.simt, state.colors,
+            blend=options.blend, layers=options.layers, lists=options.lists, room=options.room,
+        )  # fmt: skip
+        return buffers, works
     return (execute.last if options.batches == 1 else execute)(
-        fine_raster, *inputs, release=options.release, samples=options.msaa,
-        mode=options.mode, colors=state.colors, buffers=state.buffers,
+        fine_raster, setup, queues.starts, queues.entries, queues.active, width, height, state.simt,
+        release=options.release, samples=options.msaa, mode=options.mode, colors=state.colors, buffers=state.buffers,
     )[:2]  # fmt: skip
 
 

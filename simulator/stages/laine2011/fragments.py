@@ -1,22 +1,29 @@
-"""Fragments of a draw without depth test, as fine raster distributes them: by tile, and in input order within it.
+"""Fine raster up to its ROP, for ROPs of other kinds: its events, and the fragments that it distributes, by tile.
 
-They are what its rounds of 32 take, one after another: fragment i of a tile is lane i % 32 of round i // 32.
+Without a depth test all fragments of a tile come in input order, and rounds of 32 take them one after another: fragment
+i of a tile is lane i % 32 of round i // 32.
 """
 
-from typing import Any, NamedTuple
+from enum import IntEnum
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.bits import lowest_bit
+from tilestamp.models.counters import counters_of, shown
 from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask
-from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE, Draw, corner
+from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers, draw_of, fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE, WARP, Draw, FineRasterEvent, corner
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
+from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
+Lists = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]  # starts, entries, active tiles
 _LOW = 0xFFFFFFFF
 
 
@@ -87,3 +94,42 @@ def list_fragments(
     with np.errstate(all="ignore"):
         for_parts(_list_part, parts, active_tiles, tile_starts, tile_entries, setup, colors, draw, out)
     return out
+
+
+@kernel
+def _count_depth_reads(fragments: Fragments, setup: Setup, draw: Draw, table: Any) -> None:
+    """Count the read of each fragment's depth plane, which fine raster without depth test leaves out."""
+    addresses = np.empty(WARP, np.int64)
+    for a in range(table.shape[0]):
+        for i in range(fragments.first[a], fragments.first[a + 1], WARP):
+            n = min(WARP, fragments.first[a + 1] - i)
+            count_reads(setup, draw, fragments.slot[i : i + n], addresses, n, 1, table[a])
+
+
+class Front(NamedTuple):
+    """What fine raster hands to a ROP."""
+
+    draw: Draw
+    buffers: FrameBuffers  # pixels as blending over leaves them
+    fragments: Fragments
+    rows: NDArray[np.int64]  # events of each active tile, those of blending over among them
+
+
+def front(
+    setup: Setup, lists: Lists, width: int, height: int, simt: Simt, colors: NDArray[np.float32], *, depth: bool
+) -> Front:
+    """Run fine raster up to its ROP, release 1.1, one sample a pixel, mode blend; ``depth``: a ROP that reads it."""
+    draw = draw_of(width, height, simt, release="1.1", mode="blend")
+    buffers, rows = fine_raster.run(setup, *lists, width, height, simt, release="1.1", mode="blend", colors=colors)
+    assert rows is not None  # noqa: S101 - it counts
+    fragments = list_fragments(setup, *lists, rows[:, FineRasterEvent.FRAGMENT_LANES], colors, draw)
+    if depth:
+        _count_depth_reads(fragments, setup, draw, rows)
+    return Front(draw, buffers, fragments, rows)
+
+
+def events_with(name: str, module: str, more: tuple[str, ...]) -> type[IntEnum]:
+    """Events of fine raster, and more behind them."""
+    made = cast("type[IntEnum]", IntEnum(name, [*FineRasterEvent.__members__, *more], start=0, module=module))
+    shown(*counters_of(FineRasterEvent))(made)
+    return made

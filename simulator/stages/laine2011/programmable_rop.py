@@ -7,13 +7,11 @@ turn. What a pixel keeps lies in shared memory, so that a program of many words 
 """
 
 from dataclasses import replace
-from enum import IntEnum
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.counters import counters_of, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
@@ -31,21 +29,17 @@ from tilestamp.simulator.stages.laine2011.blend_programs import (
     start_pixel,
     words_of,
 )
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers, draw_of, fine_raster, new_buffers
-from tilestamp.simulator.stages.laine2011.fine_raster_queue import PIXELS, TILE, WARP, Draw, FineRasterEvent
-from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads
+from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
-from tilestamp.simulator.stages.laine2011.fragments import Fragments, list_fragments
+from tilestamp.simulator.stages.laine2011.fragments import Fragments, events_with, front
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
-Lists = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]  # starts, entries, active tiles
 _LAYERED = ("LAYER_STEPS", "LAYER_LANES", "RESOLVE_LAYERS")
 _CLASSES = ("FP32", "INT32", "MUL32", "SFU", "CONTROL", "SHARED", "LANES")
-# Events of fine raster; layers gone through in steps of the ROP, and when the tile is done, by half of its pixels at a
-# time; and the instructions of the user's function, which no mix can know.
-_NAMES = [*FineRasterEvent.__members__, *_LAYERED, *_CLASSES]
-ProgramEvent = cast("type[IntEnum]", IntEnum("ProgramEvent", _NAMES, start=0, module=__name__))
-shown(*counters_of(FineRasterEvent))(ProgramEvent)
+ProgramEvent = events_with("ProgramEvent", __name__, (*_LAYERED, *_CLASSES))
+"""Layers gone through in steps of the ROP, and when the tile is done, by half of its pixels at a time; and the
+instructions of the user's function, which no mix can know."""
 
 
 def needs_depth(program: str) -> bool:
@@ -96,29 +90,6 @@ def _blend_tiles(
             image[y, x] = resolved(pixels[p], program)
 
 
-@kernel
-def count_depth_reads(fragments: Fragments, setup: Setup, draw: Draw, table: Any) -> None:
-    """Count the read of each fragment's depth plane, which fine raster without depth test leaves out."""
-    addresses = np.empty(WARP, np.int64)
-    for a in range(table.shape[0]):
-        for i in range(fragments.first[a], fragments.first[a + 1], WARP):
-            n = min(WARP, fragments.first[a + 1] - i)
-            count_reads(setup, draw, fragments.slot[i : i + n], addresses, n, 1, table[a])
-
-
-def front(
-    setup: Setup, lists: Lists, width: int, height: int, simt: Simt, colors: NDArray[np.float32], *, depth: bool
-) -> tuple[Draw, Fragments, NDArray[np.int64]]:
-    """Run fine raster up to its ROP: the draw, its fragments, and its events with those of blending over."""
-    draw = draw_of(width, height, simt, release="1.1", mode="blend")
-    _, rows = fine_raster.run(setup, *lists, width, height, simt, release="1.1", mode="blend", colors=colors)
-    assert rows is not None  # noqa: S101 - it counts
-    fragments = list_fragments(setup, *lists, rows[:, FineRasterEvent.FRAGMENT_LANES], colors, draw)
-    if depth:
-        count_depth_reads(fragments, setup, draw, rows)
-    return draw, fragments, rows
-
-
 def fragment_keys(setup: Setup, fragments: Fragments, active: NDArray[np.int32], tiles: int) -> NDArray[np.int64]:
     """A number for each fragment that no other has: its triangle, and its pixel."""
     tile = np.repeat(active.astype(np.int64), np.diff(fragments.first))
@@ -167,9 +138,8 @@ def programmable_rop(
     theirs = None if name in BUILT_IN else find_program(program) if isinstance(program, str) else program
     code = BUILT_IN.index(name) if theirs is None else -1
     words = words_of(code, layers) if theirs is None else theirs.words
-    draw, fragments, rows = front(setup, lists, width, height, simt, colors, depth=needs_depth(name))
+    draw, buffers, fragments, rows = front(setup, lists, width, height, simt, colors, depth=needs_depth(name))
     keys = fragment_keys(setup, fragments, active_tiles, len(tile_starts) - 1)
-    buffers = new_buffers(width, height)
     if theirs is None:
         for_parts(
             _blend_part, parts_of(len(active_tiles), 32),
