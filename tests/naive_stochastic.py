@@ -21,13 +21,11 @@ def placed(triangles, p, time, lens_point):
 
 def determinant(a, b, c):
     """Of three columns."""
-    return (
-        a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1]) + c[0] * (a[1] * b[2] - a[2] * b[1])
-    )
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1]) + c[0] * (a[1] * b[2] - a[2] * b[1])
 
 
 def hit(triangles, pattern, p, x, y, s):
-    """Depth of triangle p at a sample, None where it is not there then; a sample on an edge lies a little right, and less down."""
+    """Depth of triangle p at a sample, None where it is not there: on an edge it lies a little right, and less down."""
     i, j = y % len(pattern.place), x % len(pattern.place)
     time, u, v = (Fraction(float(value)) for value in pattern.time_lens[i, j, s])
     corners = placed(triangles, p, time, (u, v))
@@ -35,7 +33,9 @@ def hit(triangles, pattern, p, x, y, s):
     whole = determinant(*columns)
     if whole == 0:
         return None
-    at_x, at_y = (start + Fraction(int(step), SUBPIXELS) for start, step in zip((x, y), pattern.place[i, j, s], strict=True))
+    at_x, at_y = (
+        start + Fraction(int(step), SUBPIXELS) for start, step in zip((x, y), pattern.place[i, j, s], strict=True)
+    )
     shares = []
     for k in range(3):
         share = []
@@ -68,12 +68,5 @@ def stays_off(triangles, p, sides, interval):
         for time in interval[:2] for u in interval[2:4] for v in interval[4:]
     ]  # fmt: skip
     corners = [corner for end in ends for corner in end]
-    planes = (
-        lambda x, y, z, w: x - x0 * w,
-        lambda x, y, z, w: x1 * w - x,
-        lambda x, y, z, w: y - y0 * w,
-        lambda x, y, z, w: y1 * w - y,
-        lambda x, y, z, w: z + w,
-        lambda x, y, z, w: w - z,
-    )
-    return any(all(plane(*corner) < 0 for corner in corners) for plane in planes)
+    distances = [(x - x0 * w, x1 * w - x, y - y0 * w, y1 * w - y, z + w, w - z) for x, y, z, w in corners]
+    return any(all(distance < 0 for distance in plane) for plane in zip(*distances, strict=True))

@@ -52,6 +52,8 @@ class StochasticOptions(MotionInput, frozen=True, kw_only=True):
     """Bound a triangle in a tile over all of shutter and lens, or over the interval of each sample of a pixel too."""
     dolly: float = 0.0
     """How far the scene comes towards the eye while the shutter is open, in model units."""
+    sample_seed: Annotated[int, Meta(ge=0)] = 7
+    """Of the places, times and lens points of the samples."""
     double: bool = False
     """Test samples in float64: no sample is wrong but for its rounding; float32 is what a GPU would take."""
 
@@ -77,7 +79,7 @@ def stochastic(
     scene, matrix, width, height, simt, options, execute
         See ``tilestamp.simulator.pipelines``.
     """
-    pattern, tile = stratified_pattern(options.spp), options.tile
+    pattern, tile = stratified_pattern(options.spp, seed=options.sample_seed), options.tile
     samples = blur_samples(width, height, pattern)
     triangles, still = _triangles(scene, matrix, width, height, options)
     intervals = intervals_of(pattern, 1 if options.bounds == "whole" else None)
@@ -96,7 +98,7 @@ def _triangles(
     start = homogeneous_pixels(clip, width, height)
     angle = np.radians(options.direction)
     end = homogeneous_pixels(clip + _dolly(scene, matrix, options.dolly), width, height)
-    end[..., :2] += np.float32(options.motion) * np.float32([np.cos(angle), -np.sin(angle)]) * end[..., 3:]
+    end[..., :2] += np.float32(options.motion) * np.array([np.cos(angle), -np.sin(angle)], np.float32) * end[..., 3:]
     lens = Lens(options.lens, options.focus or float(clip[..., 3].mean()))
     return moving_triangles(start, end, lens, double=options.double), still
 

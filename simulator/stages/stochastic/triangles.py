@@ -1,9 +1,9 @@
 """Triangles that move behind a thin lens, in homogeneous pixels, and the test of a sample (Laine & Karras 2011).
 
 A corner goes on a straight line in clip space while the shutter is open. A point of the lens moves it by its signed
-circle of confusion, ``aperture (w - focus) / w`` pixels, which is linear before the division by w. So a corner, seen from
-a sample, is X = x(t) + w(t) (aperture u - sx) - aperture u focus, Y alike; what depends on the sample alone is computed
-once for all triangles. Then an edge is X_i Y_j - X_j Y_i, and the three edges are the weights of the corners.
+circle of confusion, ``aperture (w - focus) / w`` pixels, which is linear before the division by w. So a corner seen
+from a sample is X = x(t) + w(t) (aperture u - sx) - aperture u focus, Y alike; what depends on the sample alone is
+computed once for all triangles. Then an edge is X_i Y_j - X_j Y_i, and the three edges are the weights of the corners.
 
 Multiply-adds of a test: 9 for the time, 12 for lens and sample (6 without a lens), 6 for the edges: 27 in five
 dimensions, 21 in three. Published: "approximately 25" in five (Laine & Karras 2011, NVIDIA technical report "Efficient
@@ -26,7 +26,7 @@ CORNER = 4  # x and y in pixels times w, z, w
 
 
 class Lens(NamedTuple):
-    """A thin lens: radius of the circle of confusion of what is infinitely far in pixels, and the w of what is sharp."""
+    """A thin lens: radius in pixels of the circle of confusion of what is infinitely far, and w of what is sharp."""
 
     aperture: float
     focus: float
@@ -55,7 +55,7 @@ def homogeneous_pixels(clip: NDArray[np.float64], width: int, height: int) -> ND
 def scene_triangles(
     scene: Scene, matrix: ArrayLike, width: int, height: int, size: float
 ) -> tuple[NDArray[np.float64], Micropolygons]:
-    """Triangles of a scene in clip space (M, 3, 4), patches diced to ``size`` pixels; whose they are, and their greys."""
+    """Triangles of a scene in clip space (M, 3, 4), patches diced to ``size`` pixels; their patches and greys."""
     if scene.patches is not None:
         points, patch = diced(scene.patches, matrix, width, height, size)
         grey, patch = np.repeat(shades(points), 2), np.repeat(patch, 2)
@@ -74,15 +74,16 @@ def moving_triangles(
     start: NDArray[np.float32], end: NDArray[np.float32], lens: Lens, *, double: bool
 ) -> MovingTriangles:
     """Triangles (M, 3, 4) in homogeneous pixels at both ends of the shutter interval."""
-    first, last = (places.astype(np.float64 if double else np.float32) for places in (start, end))
+    kind: type[np.floating[Any]] = np.float64 if double else np.float32
+    first, last = np.asarray(start, kind), np.asarray(end, kind)
     return MovingTriangles(np.ascontiguousarray(np.stack([first, last - first], axis=1)), lens)
 
 
 @kernel
 def seen_from(corners: Any, p: int, time: Any, a: Any, b: Any, seen: Any) -> None:
-    """Place triangle p as a sample sees it: X, Y and w of each corner; ``a`` and ``b`` hold x and y of the sample's own.
+    """Place triangle p as a sample sees it: X, Y and w of each corner.
 
-    ``a`` is aperture times the lens point less the place of the sample, ``b`` aperture times the lens point times focus.
+    ``a`` (x, y) is aperture times lens point less the sample's place, ``b`` aperture times lens point times focus.
     """
     for k in range(3):
         w = corners[p, 0, k, 3] + time * corners[p, 1, k, 3]
@@ -116,7 +117,7 @@ def covers(seen: Any, weights: Any) -> bool:
     negative = weights[0] < 0 or weights[1] < 0 or weights[2] < 0
     if positive == negative:
         return False
-    for k in range(3):
+    for k in range(3):  # noqa: SIM110 - Numba takes no generators
         if weights[k] == 0 and not _owns(seen, (k + 1) % 3, (k + 2) % 3, positive):
             return False
     return True
@@ -124,7 +125,7 @@ def covers(seen: Any, weights: Any) -> bool:
 
 @kernel
 def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
-    """Depth of a covered sample, 0 near to 1 far; -1 where it lies behind the eye, or is nearer or farther than seen."""
+    """Depth of a covered sample, 0 near to 1 far; -1 where it lies behind the eye, or before near or behind far."""
     z, w, total = weights[0] * 0, weights[0] * 0, weights[0] + weights[1] + weights[2]
     for k in range(3):
         z += weights[k] * (corners[p, 0, k, 2] + time * corners[p, 1, k, 2])
