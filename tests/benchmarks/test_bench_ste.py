@@ -7,6 +7,7 @@ from tilestamp.experiments.exploration import quad_merging
 from tilestamp.experiments.ste.setting import cube
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
+from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
@@ -53,3 +54,10 @@ def test_merge_quads_of_pixel_sized_triangles(benchmark, entries):
         quad_shading(polygons, new_samples(256, 256, sample_positions(4)), entries, simt)
 
     benchmark(draw)
+
+
+@pytest.mark.parametrize("bounds", ["whole", "intervals"])
+def test_draw_a_moving_defocused_teapot_in_tiles(benchmark, bounds):
+    benchmark(
+        simulate, "teapot", "stochastic", width=320, height=240, fidelity="counts", edge=8.0, motion=16.0, bounds=bounds
+    )

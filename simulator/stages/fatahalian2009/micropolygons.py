@@ -52,12 +52,19 @@ def from_patches(
     patches: Patches, matrix: ArrayLike, width: int, height: int, size: float = 1.0, triangles: bool = False
 ) -> Micropolygons:
     """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels."""
+    return _on_screen(*diced(patches, matrix, width, height, size), matrix, width, height, triangles)
+
+
+def diced(
+    patches: Patches, matrix: ArrayLike, width: int, height: int, size: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Corners of a patch's micropolygons in its own space, (M, 4, 4), and the patch of each."""
     points = patches.points.astype(np.float64)
     rates = _rates(project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 16, 3), size)
     ends = np.cumsum(rates**2)
     polygons = np.empty((int(ends[-1]) if len(ends) else 0, 4, 4))
     _evaluate(points, rates, ends, polygons)
-    return _on_screen(polygons, np.repeat(np.arange(len(rates)), rates**2), matrix, width, height, triangles)
+    return polygons, np.repeat(np.arange(len(rates)), rates**2)
 
 
 def from_surface(
@@ -90,7 +97,7 @@ def _on_screen(
     screen, usable = project(polygons.reshape(-1, 4), matrix, width, height)
     kept = usable.reshape(-1, corners).all(axis=1)
     vertices = screen.reshape(-1, corners, 3).astype(np.float32)[kept]
-    made = Micropolygons(vertices, patch[kept].astype(np.int32), _shades(polygons)[kept], int((~kept).sum()))
+    made = Micropolygons(vertices, patch[kept].astype(np.int32), shades(polygons)[kept], int((~kept).sum()))
     return _split(made) if triangles and corners == 4 else made
 
 
@@ -116,14 +123,14 @@ def project(
     return screen, usable
 
 
-def _shades(polygons: NDArray[np.float64]) -> NDArray[np.uint8]:
+def shades(polygons: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Grey by the angle between normal and light, from either side."""
     points = polygons[:, :, :3] / polygons[:, :, 3:]
     normals = np.cross(points[:, 2] - points[:, 0], points[:, -1] - points[:, 1])
     length = np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
     lit = np.abs(normals @ LIGHT) / length
-    shades: NDArray[np.uint8] = (40.0 + 200.0 * np.minimum(lit, 1.0)).astype(np.uint8)
-    return shades
+    greys: NDArray[np.uint8] = (40.0 + 200.0 * np.minimum(lit, 1.0)).astype(np.uint8)
+    return greys
 
 
 def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:
