@@ -84,7 +84,7 @@ FILTERED = [
         ("binned", ("nearest", "bilinear", "trilinear")),
     )
     for texture_filter in filters
-]
+] + [Variant("binned", "trilinear texels, no quads", {"derivatives": "planes", **BOTH_SIDES})]
 
 # Kernels of these are compiled by other experiments of the first run; the others would add minutes of compiling
 QUICK_TRIANGLES = [HARDWARE[2], *HARDWARE[4:], CUDARASTER[0], *FREEPIPE, *TILED[1:3]]

@@ -5,6 +5,7 @@ Modelled
 - Clears, nine kernels before and after their optimizations, bins, tiles and quads, hierarchical and early depth
   tests.
 - Textures in rows or tiles, trilinear filtering, transparency in API order or by depth.
+- Derivatives without quads, where asked for (``derivatives``).
 - What the original gets wrong where it is asked for: lost fragments, holes of a stepped depth, rows beyond whole
   blocks.
 
@@ -34,7 +35,7 @@ from tilestamp.simulator.stages.zhang2025.coarse_bin import CoarseRasterizerEven
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer, coarse_work
 from tilestamp.simulator.stages.zhang2025.fine_rasterizer import fine_rasterizer
 from tilestamp.simulator.stages.zhang2025.frame_clears import frame_clears
-from tilestamp.simulator.stages.zhang2025.pixel_shader import OVERDRAW, Filter, pixel_shader
+from tilestamp.simulator.stages.zhang2025.pixel_shader import OVERDRAW, Derivatives, Filter, pixel_shader
 from tilestamp.simulator.stages.zhang2025.primitive_assembly import primitive_assembly
 from tilestamp.simulator.stages.zhang2025.primitive_binning import primitive_binning
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import primitive_compaction
@@ -71,6 +72,9 @@ class BinnedOptions(Options, frozen=True, kw_only=True):
     """Texels on a side of a storage tile."""
     texture_levels: Annotated[int, Meta(ge=0, le=MAX_LEVELS)] = 0
     """Levels of a texture for trilinear filtering; 0 for all. The original's current state: rows, 4 levels."""
+    derivatives: Derivatives = "quads"
+    """Derivatives of texture coordinates: differences in a quad of 2x2 pixels, or from the planes of the triangle; then
+    pixels that it does not cover are not shaded."""
     cull_backfaces: bool = True
     """Cull triangles that face away."""
     fragments_a_pixel: Annotated[int, Meta(ge=0, le=65536)] = KEPT
@@ -141,6 +145,7 @@ def binned(
     stream = execute(
         pixel_shader, data, tiles, fragments, chains, mesh.texture_ids, simt,
         texture_filter=options.texture_filter, opacity=options.opacity, optimized=optimized,
+        derivatives=options.derivatives,
     ).outputs  # fmt: skip
     pixels, (resolve,), _ = execute(
         rop, data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
@@ -148,10 +153,11 @@ def binned(
     )  # fmt: skip
     image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
 
+    in_stream = int(np.bitwise_count(stream.shaded).sum(dtype=np.int64))
     facts = {
         "primitives after culling": len(data.ids),
         "quads": len(stream.entries),
-        "fragments beyond the stream's room": max(0, 4 * len(stream.entries) - OVERDRAW * width * height),
+        "fragments beyond the stream's room": max(0, in_stream - OVERDRAW * width * height),
         "fragments lost beyond the kept ones": resolve.total(RopEvent.LOST),
         "holes": resolve.total(RopEvent.HOLES),
     }

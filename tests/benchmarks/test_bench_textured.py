@@ -25,6 +25,12 @@ def test_bunny_through_nine_stages(benchmark, shared):
     assert (frame.triangle_ids >= 0).any()
 
 
+def test_bunny_without_quads(benchmark, shared):
+    """Aim: that of quads."""
+    frame = timed(benchmark, binned, BinnedOptions(derivatives="planes"), "bunny", (1920, 1080), "ga104")
+    assert (frame.triangle_ids >= 0).any()
+
+
 def test_engine_by_tiles(benchmark, shared):
     """Aim: 0.7 s."""
     frame = timed(benchmark, tiled, TiledOptions(), "2CylinderEngine", (800, 800), "gt750m")

@@ -128,6 +128,7 @@ GENERATED_FRAMES = (
     Frame("binned", SOUP, "ga104", {"fragment_depth": "stepped"}),
     Frame("binned", SOUP, "h200", {"order": "oit", "texture_filter": "bilinear", "cull_backfaces": False}),
     Frame("binned", SOUP, "h200", {}),  # magnified textures
+    *(Frame("binned", SOUP, machine, {"derivatives": "planes"}) for machine in ("ga104", "h200")),
     Frame("binned", SOUP, "ga104", {"optimized": False, "texture_layout": "rows", "texture_filter": "nearest"}),
     Frame("binned", SOUP, "h200", {"optimized": False, "texture_layout": "rows", "texture_filter": "nearest"}),
 )

@@ -2,7 +2,8 @@
 
 One thread a fragment, 256 a block, launched for the whole stream of 4 fragments a pixel. Lanes 4i..4i+3 are a quad, so
 differences between them give the derivatives of the texture coordinates, and those the level of detail of trilinear
-filtering. Every fragment, helper pixels of a quad included, links itself to its pixel by an atomicExch.
+filtering. Every fragment, helper pixels of a quad included, links itself to its pixel by an atomicExch. With
+derivatives from planes (the "non-quad derivatives" of Laine & Karras 2011) the stream has covered fragments alone.
 """
 
 from typing import Any, Literal, NamedTuple
@@ -29,6 +30,7 @@ from tilestamp.simulator.stages.zhang2025.pixel_shader_block import (
     PixelShaderEvent,
     shade_block,
 )
+from tilestamp.simulator.stages.zhang2025.pixel_shader_planes import shade_fragments
 from tilestamp.simulator.stages.zhang2025.triangle_setup import TriangleSetupData
 from tilestamp.simulator.work import Work
 
@@ -38,6 +40,7 @@ LINES_IN, LINES_OUT = 12, 8  # of 128 bytes that a warp's records lie in
 AT_ONCE = 1 << 16  # bytes: what a warp stores again, or another one of the tile, it does at once
 FILTERS = {"nearest": NEAREST, "bilinear": BILINEAR, "trilinear": TRILINEAR}
 Filter = Literal["nearest", "bilinear", "trilinear"]
+Derivatives = Literal["quads", "planes"]
 
 
 class FragmentStream(NamedTuple):
@@ -51,15 +54,18 @@ class FragmentStream(NamedTuple):
         Left lower pixel of each quad.
     colors : ndarray, (Q, 4, 4), float32
         RGBA of its fragments.
+    shaded : ndarray, (Q,), uint8
+        Bit k: whether fragment k is in the stream; of quads all four are.
     """
 
     entries: NDArray[np.int32]
     places: NDArray[np.int32]
     colors: NDArray[np.float32]
+    shaded: NDArray[np.uint8]
 
 
 @kernel(error_model="numpy", lent=True)
-def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any) -> int:
+def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any, covered: Any) -> int:
     """Lay the quads out in stream order: by tile, entry, place; with ``entries`` None only count."""
     count = 0
     for tile in range(len(starts) - 1):
@@ -74,6 +80,8 @@ def _quads(starts: Any, masks: Any, tile_columns: int, entries: Any, places: Any
                 entries[count] = i
                 places[count, 0] = tile % tile_columns * TILE + corner % TILE
                 places[count, 1] = tile // tile_columns * TILE + corner // TILE
+                bits = masks[i] >> np.uint64(corner)
+                covered[count] = bits & np.uint64(3) | bits >> np.uint64(6) & np.uint64(12)
                 count += 1
     return count
 
@@ -92,6 +100,20 @@ def _pixel_shader(
         )  # fmt: skip
 
 
+@kernel(error_model="numpy", lent=True)
+def _pixel_shader_planes(
+    part: int, parts: int, fragments: Any, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any,
+    chains: Any, method: int, opacity: Any, rule: int, merge: int, width: int, colors: Any, events: Any,
+) -> None:  # fmt: skip
+    """Shade a part of the blocks that have fragments, without quads."""
+    blocks = (len(fragments) + BLOCK - 1) // BLOCK
+    for block in range(part * blocks // parts, (part + 1) * blocks // parts):
+        shade_fragments(
+            fragments, quads, places, queue, planes, ids, texture_ids, chains, method,
+            opacity, rule, merge, width, block * BLOCK, colors, events[block],
+        )  # fmt: skip
+
+
 def pixel_shader(
     data: TriangleSetupData,
     tiles: TileQueues,
@@ -103,6 +125,7 @@ def pixel_shader(
     texture_filter: Filter,
     opacity: float,
     optimized: bool,
+    derivatives: Derivatives = "quads",
 ) -> StageResult[FragmentStream]:
     """Shade the stream.
 
@@ -120,25 +143,35 @@ def pixel_shader(
         Multiplies every alpha.
     optimized : bool
         16-byte accesses to packed fragments; or words of a 48-byte structure and a texture that spills.
+    derivatives : {"quads", "planes"}
+        From differences in a quad, or from the planes of the triangle: then helper pixels are left out.
 
     Returns
     -------
     outputs : FragmentStream
     works : one
     """
-    count = _quads(tiles.starts, fragments.masks, tiles.columns, None, None)
+    found = _quads(tiles.starts, fragments.masks, tiles.columns, None, None, None)
     stream = FragmentStream(
-        np.empty(count, np.int32), np.empty((count, 2), np.int32), np.empty((count, 4, 4), np.float32)
-    )
-    _quads(tiles.starts, fragments.masks, tiles.columns, stream.entries, stream.places)
-    pixels = fragments.depth.size
-    blocks = -(-max(4 * count, OVERDRAW * pixels) // BLOCK)
-    events = np.zeros((blocks, len(PixelShaderEvent)), np.int64)
-    for_parts(
-        _pixel_shader, parts_of(4 * count, BLOCK), stream.entries, stream.places, tiles.entries, data.planes, data.ids,
-        texture_ids, chains, FILTERS[texture_filter], np.float32(opacity), int(simt.coalescing),
-        int(simt.atomic_merge), fragments.depth.shape[1], stream.colors, events,
+        np.empty(found, np.int32), np.empty((found, 2), np.int32), np.zeros((found, 4, 4), np.float32),
+        np.empty(found, np.uint8),
     )  # fmt: skip
+    _quads(tiles.starts, fragments.masks, tiles.columns, stream.entries, stream.places, stream.shaded)
+    if derivatives == "quads":
+        stream.shaded[:] = 15
+    lanes = np.flatnonzero((stream.shaded[:, None] >> np.arange(4)) & 1) if derivatives == "planes" else None
+    count, pixels = 4 * found if lanes is None else len(lanes), fragments.depth.size
+    blocks = -(-max(count, OVERDRAW * pixels) // BLOCK)
+    events = np.zeros((blocks, len(PixelShaderEvent)), np.int64)
+    inputs = (
+        stream.entries, stream.places, tiles.entries, data.planes, data.ids, texture_ids, chains,
+        FILTERS[texture_filter], np.float32(opacity), int(simt.coalescing), int(simt.atomic_merge),
+        fragments.depth.shape[1], stream.colors, events,
+    )  # fmt: skip
+    if lanes is None:
+        for_parts(_pixel_shader, parts_of(count, BLOCK), *inputs)
+    else:
+        for_parts(_pixel_shader_planes, parts_of(count, BLOCK), lanes, *inputs)
     _add_costs(events, optimized)
     total = events.sum(axis=0)
     texels = min(
@@ -148,8 +181,8 @@ def pixel_shader(
         Stream(
             "fragments",
             "load",
-            4 * count * FRAGMENT_BYTES,
-            4 * count * FRAGMENT_BYTES,
+            count * FRAGMENT_BYTES,
+            count * FRAGMENT_BYTES,
             partial_lines=LINES_IN * int(3 * total[PixelShaderEvent.WARPS] - total[PixelShaderEvent.TEXTURED_WARPS]),
         ),
         Stream("texture", "load", texels, texels),
@@ -157,7 +190,7 @@ def pixel_shader(
             "fragments_out",
             "store",
             int(total[PixelShaderEvent.STORE_BYTES]),
-            4 * count * FRAGMENT_OUT_BYTES,
+            count * FRAGMENT_OUT_BYTES,
             AT_ONCE,
             partial_lines=2 * LINES_OUT * int(total[PixelShaderEvent.WARPS]),
         ),
@@ -165,7 +198,7 @@ def pixel_shader(
             "pixel_base",
             "atomic",
             32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]),
-            min(16 * count, 4 * pixels),
+            min(4 * count, 4 * pixels),
             AT_ONCE,
         ),
     )
@@ -178,6 +211,7 @@ def pixel_shader(
         grid=blocks,
         block=BLOCK,
         streams=streams,
+        variant="" if derivatives == "quads" else derivatives,
     )
     return StageResult(stream, (work,))
 

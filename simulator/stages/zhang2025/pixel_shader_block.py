@@ -77,6 +77,25 @@ def _light(planes: Any, x: Any, y: Any) -> Any:
 
 
 @kernel(error_model="numpy", lent=True)
+def shade_pixel(
+    planes: Any, chains: Any, texture: int, method: int, opacity: Any, x: Any, y: Any, lod: Any, uv: Any, out: Any
+) -> None:
+    """Colour of one pixel at (x, y), texture coordinate ``uv``."""
+    out[:] = _ONE if texture < 0 else _ZERO
+    if texture >= 0 and method == TRILINEAR:
+        add_trilinear(chains, texture, lod, uv[0], uv[1], out)
+    elif texture >= 0 and method == BILINEAR:
+        add_bilinear(chains, texture, 0, uv[0], uv[1], _ONE, out)
+    elif texture >= 0:
+        nearest(chains, texture, uv[0], uv[1], out)
+    w = _ONE / evaluate(planes[ONE_OVER_W], x, y)
+    light = _light(planes, x, y)
+    for c in range(3):
+        out[c] *= evaluate(planes[COLOR + c], x, y) * w * light
+    out[3] *= evaluate(planes[COLOR + 3], x, y) * w * opacity
+
+
+@kernel(error_model="numpy", lent=True)
 def _shade_quad(
     planes: Any, chains: Any, texture: int, method: int, opacity: Any, place: Any, uv: Any, out: Any
 ) -> Any:
@@ -91,35 +110,48 @@ def _shade_quad(
             lod = level_of_detail(chains, texture, step)
     for k in range(4):
         x, y = np.float32(place[0] + k % 2) + _HALF, np.float32(place[1] + k // 2) + _HALF
-        out[k] = _ONE if texture < 0 else _ZERO
-        if texture >= 0 and method == TRILINEAR:
-            add_trilinear(chains, texture, lod, uv[k, 0], uv[k, 1], out[k])
-        elif texture >= 0 and method == BILINEAR:
-            add_bilinear(chains, texture, 0, uv[k, 0], uv[k, 1], _ONE, out[k])
-        elif texture >= 0:
-            nearest(chains, texture, uv[k, 0], uv[k, 1], out[k])
-        w = _ONE / evaluate(planes[ONE_OVER_W], x, y)
-        light = _light(planes, x, y)
-        for c in range(3):
-            out[k, c] *= evaluate(planes[COLOR + c], x, y) * w * light
-        out[k, 3] *= evaluate(planes[COLOR + 3], x, y) * w * opacity
+        shade_pixel(planes, chains, texture, method, opacity, x, y, lod, uv[k], out[k])
     return lod, step <= MAGNIFIED
 
 
 @kernel(error_model="numpy", lent=True)
-def _addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: int, addresses: Any) -> None:
-    """Byte addresses of the texels that a quad's four lanes load, ``addresses`` (8, lanes)."""
+def texel_addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, lane: int, addresses: Any) -> None:
+    """Byte addresses of the texels that a lane loads, column ``lane`` of ``addresses`` (8, lanes)."""
     levels = 2 if method == TRILINEAR else 1
-    for k in range(4):
-        for n in range(levels):
-            level = min(int(lod) + n, chains.counts[texture] - 1)
-            x, y, _, _ = footprint(chains, texture, level, uv[k, 0], uv[k, 1])
-            if method == NEAREST:
-                x = int(np.floor(uv[k, 0] * np.float32(chains.levels[texture, 0, 1])))
-                y = int(np.floor(uv[k, 1] * np.float32(chains.levels[texture, 0, 2])))
-            for corner in range(1 if method == NEAREST else 4):
-                i = texel_index(chains, texture, level, x + corner % 2, y + corner // 2)
-                addresses[4 * n + corner, lane + k] = i * TEXEL_BYTES
+    for n in range(levels):
+        level = min(int(lod) + n, chains.counts[texture] - 1)
+        x, y, _, _ = footprint(chains, texture, level, uv[0], uv[1])
+        if method == NEAREST:
+            x = int(np.floor(uv[0] * np.float32(chains.levels[texture, 0, 1])))
+            y = int(np.floor(uv[1] * np.float32(chains.levels[texture, 0, 2])))
+        for corner in range(1 if method == NEAREST else 4):
+            i = texel_index(chains, texture, level, x + corner % 2, y + corner // 2)
+            addresses[4 * n + corner, lane] = i * TEXEL_BYTES
+
+
+@kernel(lent=True)
+def count_warp(
+    lanes: int, textured: int, magnified: int, method: int, links: Any, pair: int, addresses: Any, rule: int,
+    merge: int, row: Any,
+) -> None:  # fmt: skip
+    """Count one warp: its fragments, their links to pixels (one for ``pair`` of them), its texels."""
+    row[PixelShaderEvent.WARPS] += 1
+    row[PixelShaderEvent.WARP_LANES] += lanes
+    row[PixelShaderEvent.TEXTURED_WARPS] += textured > 0
+    row[PixelShaderEvent.MAGNIFIED_WARPS] += magnified > 0
+    linked, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP // pair, merge)
+    row[PixelShaderEvent.ATOMIC] += 1
+    row[PixelShaderEvent.ATOMIC_LANES] += pair * linked
+    row[PixelShaderEvent.ATOMIC_REQUESTS] += requests if merge == SECTOR else pair * requests
+    row[PixelShaderEvent.ATOMIC_CONFLICTS] += pair * conflicts
+    row[PixelShaderEvent.ATOMIC_DEPTH] += depth
+    loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
+    row[PixelShaderEvent.TEXEL_LOADS] += loads
+    row[PixelShaderEvent.TEXEL_LANES] += loads * textured
+    for n in range(loads):
+        count, size = transactions(addresses[n], 4 * QUADS_A_WARP, TEXEL_BYTES, rule)
+        row[PixelShaderEvent.TEXTURE_TRANSACTIONS] += count
+        row[PixelShaderEvent.TEXTURE_BYTES] += size
 
 
 @kernel(error_model="numpy")
@@ -144,24 +176,9 @@ def shade_block(
                 links[(4 * (q - warp) + k) // pair] = 4 * at
             lod, large = _shade_quad(planes[p], chains, texture, method, opacity, places[q], uv, colors[q])
             if row is not None and texture >= 0:
-                _addresses(chains, texture, method, lod, uv, 4 * (q - warp), addresses)
+                for k in range(4):
+                    texel_addresses(chains, texture, method, lod, uv[k], 4 * (q - warp) + k, addresses)
                 textured += 4
                 magnified += large
         if row is not None:
-            row[PixelShaderEvent.WARPS] += 1
-            row[PixelShaderEvent.WARP_LANES] += 4 * (end - warp)
-            row[PixelShaderEvent.TEXTURED_WARPS] += textured > 0
-            row[PixelShaderEvent.MAGNIFIED_WARPS] += magnified > 0
-            lanes, requests, conflicts, depth = count_atomics(links, 4 * QUADS_A_WARP // pair, merge)
-            row[PixelShaderEvent.ATOMIC] += 1
-            row[PixelShaderEvent.ATOMIC_LANES] += pair * lanes
-            row[PixelShaderEvent.ATOMIC_REQUESTS] += requests if merge == SECTOR else pair * requests
-            row[PixelShaderEvent.ATOMIC_CONFLICTS] += pair * conflicts
-            row[PixelShaderEvent.ATOMIC_DEPTH] += depth
-            loads = (1 if method == NEAREST else 4 if method == BILINEAR else 8) if textured else 0
-            row[PixelShaderEvent.TEXEL_LOADS] += loads
-            row[PixelShaderEvent.TEXEL_LANES] += loads * textured
-            for n in range(loads):
-                count, size = transactions(addresses[n], 4 * QUADS_A_WARP, TEXEL_BYTES, rule)
-                row[PixelShaderEvent.TEXTURE_TRANSACTIONS] += count
-                row[PixelShaderEvent.TEXTURE_BYTES] += size
+            count_warp(4 * (end - warp), textured, magnified, method, links, pair, addresses, rule, merge, row)

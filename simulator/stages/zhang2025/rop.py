@@ -32,13 +32,13 @@ FragmentDepth = Literal["direct", "stepped", "biased"]
 
 
 @kernel(error_model="numpy", lent=True)
-def _link(quads: Any, places: Any, heads: Any, links: Any) -> None:
+def _link(shaded: Any, places: Any, heads: Any, links: Any) -> None:
     """Link the lists as PixelShader's atomicExch leaves them, in stream order."""
     height, width = heads.shape
-    for q in range(len(quads)):
+    for q in range(len(shaded)):
         for k in range(4):
             x, y = places[q, 0] + k % 2, places[q, 1] + k // 2
-            if x < width and y < height:
+            if x < width and y < height and (shaded[q] >> k) & 1:
                 links[4 * q + k] = heads[y, x]
                 heads[y, x] = 4 * q + k
 
@@ -104,7 +104,7 @@ def rop(
     """
     height, width = fragments.depth.shape
     heads, links = np.full((height, width), -1, np.int32), np.full(4 * len(stream.entries), -1, np.int32)
-    _link(stream.entries, stream.places, heads, links)
+    _link(stream.shaded, stream.places, heads, links)
     if zero_ends:
         heads[heads == 0] = links[links == 0] = -1
     out = Resolved(
