@@ -95,6 +95,18 @@ def _tile_bits(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba
     return lambda a, b, c: _llvm_tile_bits(a, b, c)  # noqa: PLW0108 - numba needs a function
 
 
+@kernel(error_model="numpy", lent=True)
+def lesser(a: Any, b: Any) -> Any:
+    """Minimum that ignores NaN, as CUDA's does."""
+    return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
+
+
+@kernel(error_model="numpy", lent=True)
+def greater(a: Any, b: Any) -> Any:
+    """Maximum that ignores NaN, as CUDA's does."""
+    return b if a != a or b > a else a  # noqa: PLR0124 - only NaN differs from itself
+
+
 @kernel(lent=True)
 def round_to_int32(value: Any) -> Any:
     """Float to int32: half to even, saturating, NaN to 0; returned as int64."""

@@ -66,6 +66,14 @@ def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
 
 
 @kernel(lent=True)
+def _load_layer(behind: Any, tile: Tile, x: int, y: int) -> None:
+    """Depths of the layer before, for depth peeling; nothing shows where they end."""
+    for p in range(PIXELS):
+        i, j = x + 7 - (p & 7), y + (p >> 3)
+        tile.zmax[p] = behind[j, i] if j < behind.shape[0] and i < behind.shape[1] else DEPTH_MAX
+
+
+@kernel(lent=True)
 def _store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
@@ -118,6 +126,7 @@ def _draw_part(
     colors: Any,
     draw: Draw,
     buffers: Any,
+    behind: Any,
     several: Any,
     table: Any,
 ) -> None:
@@ -126,7 +135,7 @@ def _draw_part(
     tile = new_tile(1 << draw.log_samples)
     lists = borrow(starts), borrow(entries)
     lent = borrow(tile), borrow(setup), borrow(colors), borrow(buffers)
-    _draw_tiles(first, last, active, lists, *lent, draw, several, borrow(table))
+    _draw_tiles(first, last, active, lists, *lent, draw, behind, several, borrow(table))
     tile.state[0] = 0  # the owner lives to here
 
 
@@ -141,6 +150,7 @@ def _draw_tiles(
     colors: Any,
     buffers: Any,
     draw: Draw,
+    behind: Any,
     several: Any,
     table: Any,
 ) -> None:
@@ -150,6 +160,8 @@ def _draw_tiles(
         left, bottom = corner(t, draw)
         x, y = (t % draw.tiles_x) * TILE, (t // draw.tiles_x) * TILE
         _load_tile(buffers, draw, tile, x, y)
+        if behind is not None:
+            _load_layer(behind, tile, x, y)
         start_tile(tile, starts[t], starts[t + 1])
         row = row_of(table, a)
         draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
@@ -230,6 +242,7 @@ def fine_raster(
     mode: Mode = "depth",
     colors: NDArray[np.float32] | None = None,
     buffers: FrameBuffers | None = None,
+    behind: NDArray[np.uint32] | None = None,
     clear_color: int = 0,
     clear_depth: float = 1.0,
     counting: bool = True,
@@ -258,6 +271,8 @@ def fine_raster(
         Linear RGBA of the vertices; None: white.
     buffers : FrameBuffers or None
         Pixels of earlier draws, drawn over in place; None: tiles start from the clear values.
+    behind : ndarray, (height, width), uint32, optional
+        Depths of the layer before (depth peeling, uncounted): only fragments behind them are drawn.
     clear_color : int
         RGBA from the low byte up.
     clear_depth : float
@@ -275,7 +290,7 @@ def fine_raster(
     draw = draw_of(
         width, height, simt, release=release, mode=mode, samples=samples, clear=buffers is None,
         clear_color=clear_color, clear_depth=clear_depth,
-    )  # fmt: skip
+    )._replace(peel=behind is not None)  # fmt: skip
     if colors is None:
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1 if draw.write_color else 1, 4), np.float32)
     drawn = active_tiles if units is None else active_tiles[units]
@@ -285,6 +300,6 @@ def fine_raster(
     with np.errstate(all="ignore"):
         for_parts(
             _draw_part, parts_of(len(drawn), _PART_TILES),
-            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, True if samples > 1 else None, table,
+            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, behind, True if samples > 1 else None, table,
         )  # fmt: skip
     return buffers, table

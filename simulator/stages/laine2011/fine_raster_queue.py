@@ -85,6 +85,7 @@ class Draw(NamedTuple):
     half_height: int
     tiles_x: int
     coalescing: int
+    peel: bool = False  # a fragment lives only behind the depth of the layer before, which is in ``Tile.zmax``
 
 
 class Tile(NamedTuple):
@@ -93,7 +94,7 @@ class Tile(NamedTuple):
     depth: np.ndarray  # (samples * 64,) int64
     color: np.ndarray  # (samples * 64,) int64, RGBA from the low byte up
     owner: np.ndarray  # (samples * 64,) int64: record of the last write, -1 where there was none
-    zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only
+    zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only; or the layer before
     before: np.ndarray  # (64,) int64: depth of a pixel before the round, where the round has hit it, and ...
     chain: np.ndarray  # (64,) int64: ... how often
     slots: np.ndarray  # (96,) int64: queue of triangles ...

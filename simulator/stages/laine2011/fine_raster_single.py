@@ -46,6 +46,8 @@ def _fragment(
 ) -> Any:
     """Depth test and write of one fragment, after all before it; True where it is written."""
     if draw.depth:
+        if draw.peel and depth <= tile.zmax[p]:
+            return False
         old = tile.depth[p]
         if depth >= old + draw.later_wins:
             return False

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.exact import biased_exponent, float_bits, truncate_to_uint32
+from tilestamp.simulator.stages.laine2011.exact import biased_exponent, float_bits, greater, truncate_to_uint32
 
 _LOW = 0xFFFFFFFF
 
@@ -52,7 +52,7 @@ def plane_equation(
     tuple of int
         x, y, base, each modulo 2**32.
     """
-    sh = min(max(biased_exponent(max(u0, u1, u2)) - 149, 0), 8)
+    sh = min(max(biased_exponent(greater(greater(u0, u1), u2)) - 149, 0), 8)
     t0 = truncate_to_uint32(u0) >> sh
     t1 = (truncate_to_uint32(u1) >> sh) - t0
     t2 = (truncate_to_uint32(u2) >> sh) - t0

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.exact import fma, round_to_int32, round_to_uint32, wrap_int32
+from tilestamp.simulator.stages.laine2011.exact import fma, lesser, round_to_int32, round_to_uint32, wrap_int32
 from tilestamp.simulator.stages.laine2011.plane_equation import plane_equation
 
 SUBPIXELS = 16  # snapped positions are multiples of 1/16 pixel
@@ -120,12 +120,6 @@ def _flips(a: Corner, b: Corner) -> Any:
     return flips
 
 
-@kernel(error_model="numpy", lent=True)
-def _lesser(a: Any, b: Any) -> Any:
-    """Minimum that ignores NaN, as CUDA's does."""
-    return b if a != a or b < a else a  # noqa: PLR0124 - only NaN differs from itself
-
-
 @kernel(error_model="numpy", lent=True, inline=True)
 def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc: Any, slot: int) -> None:
     """Write the snapped vertices and the word beside them: least depth and the flips of the three edges."""
@@ -134,7 +128,7 @@ def store_header(a: Corner, b: Corner, c: Corner, view: View, headers: Any, misc
     headers[slot, 4], headers[slot, 5] = np.int16(c.sx & 0xFFFF), np.int16(c.sy & 0xFFFF)
     word = np.int64(_flips(a, b) << 8 | _flips(b, c) << 4 | _flips(c, a))
     if view.depth:
-        nearest = _lesser(_lesser(a.depth, b.depth), c.depth)
+        nearest = lesser(lesser(a.depth, b.depth), c.depth)
         word |= round_to_uint32(nearest - np.float32(DEPTH_ERROR << view.log_samples)) & 0xFFFFF000
     misc[slot] = np.uint32(word)
 

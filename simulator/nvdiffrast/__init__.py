@@ -1,0 +1,14 @@
+"""nvdiffrast's forward interface on NumPy arrays, without a GPU: its results to the bit (0.4.0, as on an H200).
+
+>>> import tilestamp.simulator.nvdiffrast as dr  # doctest: +SKIP
+>>> rast, rast_db = dr.rasterize(pos, tri, resolution=(1024, 1024))  # doctest: +SKIP
+>>> color, _ = dr.interpolate(attributes, rast, tri)  # doctest: +SKIP
+
+Every function takes NumPy arrays, and anything on the CPU with ``__array__`` or ``__dlpack__``. Contexts fall away.
+"""
+
+from tilestamp.simulator.nvdiffrast.depth_peeler import DepthPeeler
+from tilestamp.simulator.nvdiffrast.interpolate import interpolate
+from tilestamp.simulator.nvdiffrast.rasterize import rasterize
+
+__all__ = ["DepthPeeler", "interpolate", "rasterize"]

@@ -1,0 +1,74 @@
+"""``DepthPeeler``: the layers of a picture from front to back."""
+
+from collections.abc import Iterable
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.nvdiffrast.draw import Clip
+from tilestamp.simulator.nvdiffrast.rasterize import Batch, Raster
+
+
+class DepthPeeler:
+    """Draw layer after layer: each pixel of a layer shows what lies next behind that of the layer before.
+
+    ``with DepthPeeler(pos, tri, resolution) as peeler: rast, rast_db = peeler.rasterize_next_layer()``
+
+    Parameters
+    ----------
+    pos, tri, resolution, ranges, grad_db, clip
+        As ``rasterize`` takes them.
+
+    Notes
+    -----
+    Depths are compared in fixed point; of several triangles at one depth the last shows, the others in no layer. A
+    peeler here holds its own state: any number may be at work, and ``rasterize`` may be called meanwhile. The
+    original has one state a context: a second peeler is refused, and ``rasterize`` returns (not raises) an exception.
+    """
+
+    def __init__(
+        self,
+        pos: Any,
+        tri: Any,
+        resolution: Iterable[int],
+        ranges: Any = None,
+        grad_db: bool = True,  # noqa: FBT001, FBT002 - as in the original
+        *,
+        clip: Clip = "2025",
+    ) -> None:
+        self._batch: Batch | None = Batch(pos, tri, resolution, ranges, clip)
+        self.grad_db = grad_db
+        self._inside = False
+        self._depths: list[NDArray[np.uint32]] | None = None
+
+    def __enter__(self) -> Self:
+        if self._batch is None:
+            raise TilestampError("this depth peeling has ended: make a new DepthPeeler")
+        self._inside = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._batch, self._depths, self._inside = None, None, False
+
+    def rasterize_next_layer(self) -> Raster:
+        """Rasterize the nearest layer, then at each call the next one behind; zeros where there is none left.
+
+        Returns
+        -------
+        rast, rast_db
+            As ``rasterize`` returns them.
+
+        Raises
+        ------
+        TilestampError
+            Outside of the ``with`` block.
+        """
+        if self._batch is None or not self._inside:
+            raise TilestampError("rasterize_next_layer is called inside the peeler's with block")
+        raster, self._depths = self._batch.layer(self._depths)
+        return raster

@@ -1,0 +1,106 @@
+"""``rasterize``: which triangle shows at each pixel, its barycentrics, and how they change from pixel to pixel."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.nvdiffrast.arrays import as_array, as_resolution, as_triangles, need_axis
+from tilestamp.simulator.nvdiffrast.draw import Clip, draw
+from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+
+Raster = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+class Batch:
+    """The images of one call, checked.
+
+    Parameters
+    ----------
+    pos, tri, resolution, ranges, clip
+        As ``rasterize`` takes them.
+    """
+
+    def __init__(self, pos: Any, tri: Any, resolution: Iterable[int], ranges: Any = None, clip: Clip = "2025") -> None:
+        self.pos = as_array("pos", pos, np.float32, "[B, V, 4] (or [V, 4] with ranges)", 2, 3)
+        need_axis("pos", self.pos, -1, 4, "[B, V, 4] (or [V, 4] with ranges)")
+        self.tri = as_triangles(tri)
+        self.height, self.width = as_resolution(resolution)
+        self.ranges: NDArray[np.int32] | None = None
+        if ranges is not None:
+            self.ranges = as_array("ranges", ranges, np.int32, "[B, 2]", 2)
+            need_axis("ranges", self.ranges, 1, 2, "[B, 2]")
+        elif self.pos.ndim == 2:
+            raise TilestampError("pos [V, 4] needs ranges, int32 [B, 2]: the triangles of each image")
+        if clip not in {"2025", "2024"}:
+            raise TilestampError(f"clip must be '2025' or '2024', not {clip!r}")
+        self.clip = clip
+
+    def __len__(self) -> int:
+        return len(self.pos) if self.pos.ndim == 3 or self.ranges is None else len(self.ranges)
+
+    def images(self) -> Iterator[tuple[NDArray[np.float32], NDArray[np.int32], int]]:
+        """Positions and triangles of each image, and the number of its first triangle."""
+        if self.pos.ndim == 3 or self.ranges is None:  # instanced: ranges are ignored, as in the original
+            yield from ((positions, self.tri, 0) for positions in self.pos)
+            return
+        for start, count in self.ranges.tolist():
+            first, last = min(max(start, 0), len(self.tri)), min(max(start + count, 0), len(self.tri))
+            yield self.pos, self.tri[first:last], first
+
+    def layer(self, behind: list[NDArray[np.uint32]] | None = None) -> tuple[Raster, list[NDArray[np.uint32]]]:
+        """Draw all images, or the next layer of them; returns ``rasterize``'s arrays, and the depths."""
+        shape = len(self), self.height, self.width, 4
+        rast, rast_db, depths = np.zeros(shape, np.float32), np.zeros(shape, np.float32), []
+        for i, (positions, triangles, first) in enumerate(self.images()):
+            nearest = None if behind is None else behind[i]
+            shown = draw(positions, triangles, self.height, self.width, self.clip, nearest)
+            pixel_barycentrics(shown.ids, positions, triangles, rast[i], rast_db[i], first)
+            depths.append(shown.depths)
+        return (rast, rast_db), depths
+
+
+def rasterize(
+    pos: Any,
+    tri: Any,
+    resolution: Iterable[int],
+    ranges: Any = None,
+    grad_db: bool = True,  # noqa: FBT001, FBT002 - as in the original
+    *,
+    clip: Clip = "2025",
+) -> Raster:
+    """Rasterize triangles as ``nvdiffrast.torch.rasterize`` with ``RasterizeCudaContext`` does.
+
+    Parameters
+    ----------
+    pos : array, (B, V, 4), float32
+        Clip positions of each image of the batch; (V, 4) with ``ranges``.
+    tri : array, (F, 3), int32
+        Vertex indices. A triangle with an index out of range is not drawn, as in the original.
+    resolution : tuple of int
+        Height and width in pixels. Above 2048 the picture is drawn in several viewports.
+    ranges : array, (B, 2), int32, optional
+        First triangle and number of triangles of each image, with ``pos`` (V, 4). Instanced mode ignores them.
+    grad_db : bool
+        As in the original: of the backward pass, which there is none of here. Derivatives are always returned.
+    clip : {"2025", "2024"}
+        The clip test of 0.3.4 and later, or that of 0.3.3.
+
+    Returns
+    -------
+    rast : ndarray, (B, H, W, 4), float32
+        u, v, z/w and triangle index + 1; zeros where nothing was drawn; row 0 at y = -1. u and v weigh vertices 0 and
+        1, perspective-correct. Of equal depths the later triangle shows.
+    rast_db : ndarray, (B, H, W, 4), float32
+        du/dX, du/dY, dv/dX, dv/dY, in units of pixels.
+
+    Raises
+    ------
+    TilestampError
+        For other shapes, types or sizes.
+    """
+    if not isinstance(grad_db, bool):
+        raise TilestampError(f"grad_db must be a bool, not {grad_db!r}")
+    return Batch(pos, tri, resolution, ranges, clip).layer()[0]
