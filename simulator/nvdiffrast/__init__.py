@@ -9,6 +9,8 @@ Every function takes NumPy arrays, and anything on the CPU with ``__array__`` or
 
 from tilestamp.simulator.nvdiffrast.depth_peeler import DepthPeeler
 from tilestamp.simulator.nvdiffrast.interpolate import interpolate
+from tilestamp.simulator.nvdiffrast.mipmap import texture_construct_mip
 from tilestamp.simulator.nvdiffrast.rasterize import rasterize
+from tilestamp.simulator.nvdiffrast.texture import texture
 
-__all__ = ["DepthPeeler", "interpolate", "rasterize"]
+__all__ = ["DepthPeeler", "interpolate", "rasterize", "texture", "texture_construct_mip"]

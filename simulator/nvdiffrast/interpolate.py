@@ -29,8 +29,7 @@ def _corners(triangle: int, tri: Any, vertices: int) -> Any:
 @kernel(error_model="numpy", lent=True)
 def _pixel(attr: Any, corners: Any, weights: Any, steps: Any, diff: Any, out: Any, out_da: Any) -> None:
     i, j, k, _ = corners
-    u, v = weights
-    b = (_ONE - u) - v
+    u, v, b = weights
     for a in range(attr.shape[1]):
         out[a] = fma(b, attr[k, a], fma(u, attr[i, a], v * attr[j, a]))
     for n in range(len(diff)):
@@ -70,7 +69,8 @@ def _rows_part(
                     if not corners[3]:
                         continue
                     valid = 0 <= triangle < len(tri)
-                    weights = (rast[y, x, 0], rast[y, x, 1]) if valid else (zero, zero)
+                    u, v = rast[y, x, 0], rast[y, x, 1]
+                    weights = (u, v, (_ONE - u) - v) if valid else (zero, zero, zero)
                     steps = rast_db[y, x] if valid and len(diff) else none
                     _pixel(attr, corners, weights, steps, diff, out[y, x], out_da[y, x])
 
