@@ -7,10 +7,19 @@
 Every function takes NumPy arrays, and anything on the CPU with ``__array__`` or ``__dlpack__``. Contexts fall away.
 """
 
+from tilestamp.simulator.nvdiffrast.antialias import antialias, antialias_construct_topology_hash
 from tilestamp.simulator.nvdiffrast.depth_peeler import DepthPeeler
 from tilestamp.simulator.nvdiffrast.interpolate import interpolate
 from tilestamp.simulator.nvdiffrast.mipmap import texture_construct_mip
 from tilestamp.simulator.nvdiffrast.rasterize import rasterize
 from tilestamp.simulator.nvdiffrast.texture import texture
 
-__all__ = ["DepthPeeler", "interpolate", "rasterize", "texture", "texture_construct_mip"]
+__all__ = [
+    "DepthPeeler",
+    "antialias",
+    "antialias_construct_topology_hash",
+    "interpolate",
+    "rasterize",
+    "texture",
+    "texture_construct_mip",
+]
