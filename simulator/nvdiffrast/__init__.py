@@ -7,12 +7,13 @@
 Every function takes NumPy arrays, and anything on the CPU with ``__array__`` or ``__dlpack__``. Contexts fall away.
 """
 
-from tilestamp.simulator.nvdiffrast.antialias import antialias, antialias_construct_topology_hash
+from tilestamp.simulator.nvdiffrast.antialias import antialias
 from tilestamp.simulator.nvdiffrast.depth_peeler import DepthPeeler
 from tilestamp.simulator.nvdiffrast.interpolate import interpolate
 from tilestamp.simulator.nvdiffrast.mipmap import texture_construct_mip
 from tilestamp.simulator.nvdiffrast.rasterize import rasterize
 from tilestamp.simulator.nvdiffrast.texture import texture
+from tilestamp.simulator.nvdiffrast.topology import antialias_construct_topology_hash
 
 __all__ = [
     "DepthPeeler",

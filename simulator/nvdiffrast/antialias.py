@@ -5,7 +5,7 @@ show different triangles look at the nearer one: where an edge of it that is a s
 their centres, the pixel that it covers in part takes some of the other's colour.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,62 +13,13 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.nvdiffrast.arrays import as_array, as_triangles, need_axis, same_batch
+from tilestamp.simulator.nvdiffrast.topology import TopologyHash, antialias_construct_topology_hash
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.laine2011.exact import fma
 
 SLACK = np.float32(1 / 16)  # pixels that a crossing may lie outside of the line between two centres
-NO_VERTEX = -1
 _PART_ROWS = 8  # at least
 _NONE, _HALF, _ONE, _NEVER = np.float32(0), np.float32(0.5), np.float32(1), np.float32(-3.4028235e38)
-
-
-class TopologyHash(NamedTuple):
-    """Across each edge of each triangle, the vertex of the triangle there."""
-
-    opposite: NDArray[np.int32]  # (F, 3) across the edge that vertex k is not of; -1 for none
-
-
-def antialias_construct_topology_hash(tri: Any) -> TopologyHash:
-    """Find which triangles share edges, once for several calls of ``antialias``.
-
-    Parameters
-    ----------
-    tri : array, (F, 3), int32
-        Triangles with a vertex twice, or a negative one, are no neighbours of any.
-
-    Returns
-    -------
-    TopologyHash
-        Of an edge of three or more triangles the first two different opposite vertices count (in the original, those
-        that come first in a race).
-    """
-    tri = as_triangles(tri)
-    whole = (tri >= 0).all(axis=1) & (tri[:, 0] != tri[:, 1]) & (tri[:, 1] != tri[:, 2]) & (tri[:, 2] != tri[:, 0])
-    ends = np.stack([tri[:, [1, 2, 0]], tri[:, [2, 0, 1]]], axis=-1).astype(np.int64)
-    edges = (ends.min(axis=-1) << 32 | ends.max(axis=-1)).reshape(-1)
-    order = np.argsort(edges, kind="stable")
-    order = order[np.repeat(whole, 3)[order]]
-    opposite = np.full(tri.size, NO_VERTEX, np.int32)
-    _pair_part(edges, order, tri.reshape(-1), opposite)
-    return TopologyHash(opposite.reshape(tri.shape))
-
-
-@kernel
-def _pair_part(edges: Any, order: Any, vertices: Any, opposite: Any) -> None:
-    """Of the corners that see one edge, in their order: give each the other of the first two different vertices."""
-    first = 0
-    while first < len(order):
-        last = first
-        one = vertices[order[first]]
-        other = np.int32(NO_VERTEX)
-        while last < len(order) and edges[order[last]] == edges[order[first]]:
-            if other < 0 and vertices[order[last]] != one:
-                other = vertices[order[last]]
-            last += 1
-        for k in range(first, last):
-            v = vertices[order[k]]
-            opposite[order[k]] = other if v == one else one if v == other else NO_VERTEX
-        first = last
 
 
 @kernel(error_model="numpy", lent=True)
@@ -103,7 +54,11 @@ def _crossing(a: Any, b: Any, c: Any, kept: Any, sign: Any) -> Any:
     whether it is a silhouette.
     """
     e0, e1, e2 = (c[0] - b[0], c[1] - b[1]), (a[0] - c[0], a[1] - c[1]), (b[0] - a[0], b[1] - a[1])
-    n0, n1, n2 = sign * _cross(b[0], e0[1], b[1], e0[0]), sign * _cross(c[0], e1[1], c[1], e1[0]), sign * _cross(a[0], e2[1], a[1], e2[0])
+    n0, n1, n2 = (
+        sign * _cross(b[0], e0[1], b[1], e0[0]),
+        sign * _cross(c[0], e1[1], c[1], e1[0]),
+        sign * _cross(a[0], e2[1], a[1], e2[0]),
+    )
     d0, d1, d2 = e0[1], e1[1], e2[1]
     if _same_sign(b[1], c[1]):
         n0, d0 = _NEVER, _ONE
@@ -119,9 +74,7 @@ def _crossing(a: Any, b: Any, c: Any, kept: Any, sign: Any) -> Any:
 
 
 @kernel(error_model="numpy", lent=True)
-def _share(
-    rast: Any, pos: Any, tri: Any, opposite: Any, j: int, i: int, down: int, along: int
-) -> Any:
+def _share(rast: Any, pos: Any, tri: Any, opposite: Any, j: int, i: int, down: int, along: int) -> Any:
     """Share of the other's colour that one of two neighbours takes: positive the first, negative the second."""
     height, width = rast.shape[:2]
     near, far = rast[j, i], rast[j + down, i + along]
@@ -143,7 +96,7 @@ def _share(
         _on_screen(pos[corners[1]], half_x, half_y, fx, fy),
         _on_screen(pos[corners[2]], half_x, half_y, fx, fy),
     )
-    kept = _silhouettes(places, pos, corners, opposite[t], half_x, half_y, fx, fy)
+    kept = _silhouettes(places, pos, opposite[t], half_x, half_y, fx, fy)
     if not (kept[0] or kept[1] or kept[2]):
         return _NONE
     a, b, c = places
@@ -157,7 +110,7 @@ def _share(
 
 
 @kernel(error_model="numpy", lent=True)
-def _silhouettes(places: Any, pos: Any, corners: Any, opposite: Any, half_x: Any, half_y: Any, fx: Any, fy: Any) -> Any:
+def _silhouettes(places: Any, pos: Any, opposite: Any, half_x: Any, half_y: Any, fx: Any, fy: Any) -> Any:
     """Of each edge, whether the triangle across lies on the same side of it, or is none."""
     a, b, c = places
     area = _cross(b[0] - a[0], c[1] - a[1], c[0] - a[0], b[1] - a[1])
@@ -207,7 +160,9 @@ def _blend_part(part: int, parts: int, color: Any, shares: Any, out: Any) -> Non
                 _blend(-shares[j - 1, i, 1], color[j, i], color[j - 1, i], out[j, i])
 
 
-def antialias(color: Any, rast: Any, pos: Any, tri: Any, topology_hash: TopologyHash | None = None) -> NDArray[np.float32]:
+def antialias(
+    color: Any, rast: Any, pos: Any, tri: Any, topology_hash: TopologyHash | None = None
+) -> NDArray[np.float32]:
     """Antialias silhouettes as ``nvdiffrast.torch.antialias`` does.
 
     Parameters
@@ -240,17 +195,18 @@ def antialias(color: Any, rast: Any, pos: Any, tri: Any, topology_hash: Topology
     if color.shape[1:3] != rast.shape[1:3]:
         raise TilestampError(f"color {list(color.shape)} and rast {list(rast.shape)} have different sizes")
     same_batch(len(color), len(rast), "color and rast")
-    if pos.ndim == 3:  # noqa: PLR2004 - [B, V, 4]
+    if pos.ndim == 3:
         same_batch(len(pos), len(rast), "pos and rast")
     if topology_hash is None:
         topology_hash = antialias_construct_topology_hash(tri)
     if not isinstance(topology_hash, TopologyHash) or topology_hash.opposite.shape != tri.shape:
         raise TilestampError("topology_hash must come from antialias_construct_topology_hash with the same tri")
-    out, parts = color.copy(), parts_of(color.shape[1], _PART_ROWS)
+    out: NDArray[np.float32] = color.copy()
+    parts = parts_of(color.shape[1], _PART_ROWS)
     shares = np.empty((*color.shape[1:3], 2), np.float32)
     with np.errstate(all="ignore"):
         for b in range(len(color)):
-            positions = pos if pos.ndim == 2 else pos[b]  # noqa: PLR2004 - [V, 4]
+            positions = pos if pos.ndim == 2 else pos[b]
             for_parts(_shares_part, parts, rast[b], positions, tri, topology_hash.opposite, shares)
             for_parts(_blend_part, parts, color[b], shares, out[b])
     return out

@@ -4,12 +4,10 @@ from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.nvdiffrast.arrays import Faults
 from tilestamp.simulator.nvdiffrast.draw import Clip
-from tilestamp.simulator.nvdiffrast.rasterize import Batch, Raster
+from tilestamp.simulator.nvdiffrast.rasterize import PEELERS, Batch, Depths, Raster
 
 
 class DepthPeeler:
@@ -21,12 +19,14 @@ class DepthPeeler:
     ----------
     pos, tri, resolution, ranges, grad_db, clip
         As ``rasterize`` takes them.
+    faults : {"mended", "kept"}
+        Mended, a peeler has a state of its own: any number may be at work, and ``rasterize`` draws meanwhile. Kept,
+        there is one state, as in a context of the original: a second peeler is refused, and ``rasterize`` returns,
+        not raises, an exception.
 
     Notes
     -----
-    Depths are compared in fixed point; of several triangles at one depth the last shows, the others in no layer. A
-    peeler here holds its own state: any number may be at work, and ``rasterize`` may be called meanwhile. The
-    original has one state a context: a second peeler is refused, and ``rasterize`` returns (not raises) an exception.
+    Depths are compared in fixed point; of several triangles at one depth the last shows, the others in no layer.
     """
 
     def __init__(
@@ -35,18 +35,24 @@ class DepthPeeler:
         tri: Any,
         resolution: Iterable[int],
         ranges: Any = None,
-        grad_db: bool = True,  # noqa: FBT001, FBT002 - as in the original
+        grad_db: bool = True,
         *,
         clip: Clip = "2025",
+        faults: Faults = "mended",
     ) -> None:
         self._batch: Batch | None = Batch(pos, tri, resolution, ranges, clip)
         self.grad_db = grad_db
+        self._shared = faults == "kept"
         self._inside = False
-        self._depths: list[NDArray[np.uint32]] | None = None
+        self._depths: Depths | None = None
 
     def __enter__(self) -> Self:
         if self._batch is None:
             raise TilestampError("this depth peeling has ended: make a new DepthPeeler")
+        if self._shared and PEELERS:
+            raise TilestampError("one depth peeler is at work already; with faults='mended' there may be several")
+        if self._shared:
+            PEELERS.append(self)
         self._inside = True
         return self
 
@@ -54,6 +60,7 @@ class DepthPeeler:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._batch, self._depths, self._inside = None, None, False
+        PEELERS[:] = [peeler for peeler in PEELERS if peeler is not self]
 
     def rasterize_next_layer(self) -> Raster:
         """Rasterize the nearest layer, then at each call the next one behind; zeros where there is none left.

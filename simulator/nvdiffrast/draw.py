@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.laine2011.bin_raster import bin_raster
 from tilestamp.simulator.stages.laine2011.coarse_raster import coarse_raster
@@ -21,6 +22,7 @@ Clip = Literal["2025", "2024"]
 the guard band (0.3.3 and before)."""
 
 TILE = 8  # pixels
+UNCOUNTED = Executor(counting=False)
 _PART_VERTICES = 4096  # at least
 
 
@@ -38,6 +40,8 @@ def draw(
     width: int,
     clip: Clip = "2025",
     behind: NDArray[np.uint32] | None = None,
+    execute: Executor = UNCOUNTED,
+    simt: Simt = Simt(),  # noqa: B008 - frozen
 ) -> Layer:
     """Draw one image.
 
@@ -51,6 +55,10 @@ def draw(
     clip : {"2025", "2024"}
     behind : ndarray, (H, W), uint32, optional
         Depths of the layer before: only what lies behind them is drawn (depth peeling).
+    execute : Executor
+        Counts what the kernels do, or not.
+    simt : Simt
+        The shape of the machine to count for.
 
     Returns
     -------
@@ -58,21 +66,20 @@ def draw(
     """
     columns, rows = list(_viewports(width)), list(_viewports(height))
     if len(columns) == len(rows) == 1:
-        return _draw_viewport(positions, triangles, height, width, clip, behind)
+        return _draw_viewport(positions, triangles, height, width, clip, behind, execute, simt)
     layer = Layer(np.full((height, width), -1, np.int32), np.full((height, width), DEPTH_MAX, np.uint32))
     for y, tile_height in rows:
         for x, tile_width in columns:
             tile = np.s_[y : y + tile_height, x : x + tile_width]
             moved = _through_viewport(positions, (width, height), (x, y), (tile_width, tile_height))
-            shown = _draw_viewport(
-                moved, triangles, tile_height, tile_width, clip, None if behind is None else behind[tile]
-            )
+            before = None if behind is None else behind[tile]
+            shown = _draw_viewport(moved, triangles, tile_height, tile_width, clip, before, execute, simt)
             layer.ids[tile], layer.depths[tile] = shown
     return layer
 
 
 def _viewports(pixels: int) -> Iterator[tuple[int, int]]:
-    """First pixel and size of the viewports along an axis: as few as hold 2048 each, of whole tiles, the last shorter."""
+    """First pixel and size of the viewports along an axis: as few as hold 2048, of whole tiles, the last shorter."""
     whole = _whole_tiles(pixels)
     size = _whole_tiles(-(-whole // -(-whole // MAX_SIZE)))
     for first in range(0, pixels, size):
@@ -111,12 +118,13 @@ def _draw_viewport(
     width: int,
     clip: Clip,
     behind: NDArray[np.uint32] | None,
+    execute: Executor,
+    simt: Simt,
 ) -> Layer:
-    shape: dict[str, Any] = {"width": width, "height": height, "simt": Simt(), "release": "nvdiffrast", "counting": False}
-    setup, _, _ = triangle_setup(
-        positions, triangles, **shape, capacity=MAX_SUBTRIANGLES, guard_band=clip == "2024", interpolate=False
-    )
-    queues, _, _ = bin_raster(setup, **shape)
-    lists, _, _ = coarse_raster(queues, setup, **shape)
-    buffers, _, _ = fine_raster(setup, lists.starts, lists.entries, lists.active, **shape, behind=behind)
+    shape: dict[str, Any] = {"width": width, "height": height, "simt": simt, "release": "nvdiffrast"}
+    whole: dict[str, Any] = {"guard_band": clip == "2024", "interpolate": False, "capacity": MAX_SUBTRIANGLES}
+    setup, _, _ = execute(triangle_setup, positions, triangles, **shape, **whole)
+    queues, _, _ = execute(bin_raster, setup, **shape)
+    lists, _, _ = execute(coarse_raster, queues, setup, **shape)
+    buffers, _, _ = execute(fine_raster, setup, lists.starts, lists.entries, lists.active, **shape, behind=behind)
     return Layer(buffers.ids[0, :height, :width], buffers.depth[0, :height, :width])

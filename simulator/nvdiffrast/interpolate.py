@@ -114,7 +114,7 @@ def interpolate(
     rast = as_array("rast", rast, np.float32, "[B, H, W, 4]", 4)
     need_axis("rast", rast, 3, 4, "[B, H, W, 4]")
     tri = as_triangles(tri)
-    images = attr[None] if attr.ndim == 2 else attr  # noqa: PLR2004 - [V, A]
+    images = attr[None] if attr.ndim == 2 else attr
     if len(images) > 1:
         same_batch(len(rast), len(images), "rast and attr")
     count = images.shape[2]
@@ -129,9 +129,7 @@ def interpolate(
     with np.errstate(all="ignore"):
         for b in range(len(rast)):
             steps = rast if diff_attrs is None else rast_db  # not read without
-            for_parts(
-                _rows_part, parts, images[b % len(images)], rast[b], tri, steps[b], diff, out[b], out_da[b]
-            )
+            for_parts(_rows_part, parts, images[b % len(images)], rast[b], tri, steps[b], diff, out[b], out_da[b])
     return out, out_da
 
 

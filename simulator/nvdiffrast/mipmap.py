@@ -112,15 +112,15 @@ def _same_axes(face: int, x: Any, y: Any, z: Any) -> Any:
         return face, x, -z, -y
     if face == 1:
         return face, x, z, -y
-    if face == 2:  # noqa: PLR2004
+    if face == 2:
         return face, y, x, z
-    if face == 3:  # noqa: PLR2004
+    if face == 3:
         return face, y, x, -z
-    return (face, z, x, -y) if face == 4 else (face, z, -x, -y)  # noqa: PLR2004
+    return (face, z, x, -y) if face == 4 else (face, z, -x, -y)
 
 
 @kernel(error_model="numpy", lent=True)
 def clamped_level(level: Any, levels: int) -> Any:
     """Level within those that there are; NaN to 0."""
-    level = level if level > _NONE else _NONE
+    level = max(_NONE, level)
     return min(level, np.float32(levels - 1))

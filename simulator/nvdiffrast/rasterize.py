@@ -1,17 +1,27 @@
 """``rasterize``: which triangle shows at each pixel, its barycentrics, and how they change from pixel to pixel."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.nvdiffrast.arrays import as_array, as_resolution, as_triangles, need_axis
-from tilestamp.simulator.nvdiffrast.draw import Clip, draw
+from tilestamp.models.machine import Machine, load_machine
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
+from tilestamp.simulator.nvdiffrast.arrays import Faults, as_array, as_resolution, as_triangles, need_axis
+from tilestamp.simulator.nvdiffrast.cost import priced
+from tilestamp.simulator.nvdiffrast.draw import UNCOUNTED, Clip, draw
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
+from tilestamp.simulator.stages.laine2011.pixel_shader import pixel_shader_work
 
 Raster = tuple[NDArray[np.float32], NDArray[np.float32]]
+Depths = list[NDArray[np.uint32]]
+PEELERS: list[object] = []
+"""The depth peeler at work, of those that keep the original's faults."""
 
 
 class Batch:
@@ -50,16 +60,49 @@ class Batch:
             first, last = min(max(start, 0), len(self.tri)), min(max(start + count, 0), len(self.tri))
             yield self.pos, self.tri[first:last], first
 
-    def layer(self, behind: list[NDArray[np.uint32]] | None = None) -> tuple[Raster, list[NDArray[np.uint32]]]:
+    def layer(
+        self, behind: Depths | None = None, execute: Executor = UNCOUNTED, simt: Simt | None = None
+    ) -> tuple[Raster, Depths]:
         """Draw all images, or the next layer of them; returns ``rasterize``'s arrays, and the depths."""
+        simt = simt or Simt()
         shape = len(self), self.height, self.width, 4
         rast, rast_db, depths = np.zeros(shape, np.float32), np.zeros(shape, np.float32), []
         for i, (positions, triangles, first) in enumerate(self.images()):
             nearest = None if behind is None else behind[i]
-            shown = draw(positions, triangles, self.height, self.width, self.clip, nearest)
+            shown = draw(positions, triangles, self.height, self.width, self.clip, nearest, execute, simt)
             pixel_barycentrics(shown.ids, positions, triangles, rast[i], rast_db[i], first)
+            if execute.counting:
+                execute.works.append(pixel_shader_work(shown.ids, triangles, simt))
             depths.append(shown.depths)
         return (rast, rast_db), depths
+
+
+@overload
+def rasterize(
+    pos: Any,
+    tri: Any,
+    resolution: Iterable[int],
+    ranges: Any = None,
+    grad_db: bool = True,
+    *,
+    clip: Clip = "2025",
+    faults: Faults = "kept",
+    cost: None = None,
+) -> Raster: ...
+
+
+@overload
+def rasterize(
+    pos: Any,
+    tri: Any,
+    resolution: Iterable[int],
+    ranges: Any = None,
+    grad_db: bool = True,
+    *,
+    clip: Clip = "2025",
+    faults: Faults = "kept",
+    cost: Machine | str | Path,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], Run]: ...
 
 
 def rasterize(
@@ -67,10 +110,12 @@ def rasterize(
     tri: Any,
     resolution: Iterable[int],
     ranges: Any = None,
-    grad_db: bool = True,  # noqa: FBT001, FBT002 - as in the original
+    grad_db: bool = True,
     *,
     clip: Clip = "2025",
-) -> Raster:
+    faults: Faults = "kept",
+    cost: Machine | str | Path | None = None,
+) -> Raster | tuple[NDArray[np.float32], NDArray[np.float32], Run]:
     """Rasterize triangles as ``nvdiffrast.torch.rasterize`` with ``RasterizeCudaContext`` does.
 
     Parameters
@@ -87,6 +132,10 @@ def rasterize(
         As in the original: of the backward pass, which there is none of here. Derivatives are always returned.
     clip : {"2025", "2024"}
         The clip test of 0.3.4 and later, or that of 0.3.3.
+    faults : {"kept", "mended"}
+        The original ignores ``ranges`` beside ``pos`` (B, V, 4); mended, they are refused.
+    cost : Machine, str or Path, optional
+        A GPU on which the call is priced.
 
     Returns
     -------
@@ -95,6 +144,9 @@ def rasterize(
         1, perspective-correct. Of equal depths the later triangle shows.
     rast_db : ndarray, (B, H, W, 4), float32
         du/dX, du/dY, dv/dX, dv/dY, in units of pixels.
+    run : Run
+        With ``cost``: what the call would take there, by stage (``run.stages``), and why (``run.why()``). The images
+        of a batch are priced one after another; the original draws them side by side, in less time.
 
     Raises
     ------
@@ -103,4 +155,13 @@ def rasterize(
     """
     if not isinstance(grad_db, bool):
         raise TilestampError(f"grad_db must be a bool, not {grad_db!r}")
-    return Batch(pos, tri, resolution, ranges, clip).layer()[0]
+    if PEELERS:  # the original returns it, and so does this where a peeler was made to keep its faults
+        return RuntimeError("depth peeling is at work: call rasterize_next_layer")  # type: ignore[return-value]
+    batch = Batch(pos, tri, resolution, ranges, clip)
+    if faults == "mended" and ranges is not None and batch.pos.ndim == 3:
+        raise TilestampError("ranges go with pos [V, 4]; pos [B, V, 4] draws all triangles in each image")
+    if cost is None:
+        return batch.layer()[0]
+    machine, execute = load_machine(cost), Executor(picture=False)
+    raster, _ = batch.layer(None, execute, machine.simt)
+    return *raster, priced(execute.works, machine, batch.width, batch.height)

@@ -24,7 +24,7 @@ def floor_to_int32(value: Any) -> Any:
 @kernel(error_model="numpy", lent=True)
 def _between(value: Any, low: Any, high: Any) -> Any:
     """Clamp; NaN to the lower end, as CUDA's fmax has it."""
-    value = value if value > low else low
+    value = max(low, value)
     return min(value, high)
 
 
@@ -123,12 +123,12 @@ def cube_texel(face: int, x: int, y: int, size: int) -> Any:
     if beyond_x or beyond_y:
         s, t, major = 2 * x + 1 - size, 2 * y + 1 - size, size - 1
         s, t = min(max(s, -size), size), min(max(t, -size), size)
-        if face < 2:  # noqa: PLR2004 - +x, -x
+        if face < 2:
             px, py, pz = (major, -t, -s) if face == 0 else (-major, -t, s)
-        elif face < 4:  # noqa: PLR2004 - +y, -y
-            px, py, pz = (s, major, t) if face == 2 else (s, -major, -t)  # noqa: PLR2004
+        elif face < 4:
+            px, py, pz = (s, major, t) if face == 2 else (s, -major, -t)
         else:
-            px, py, pz = (s, -t, major) if face == 4 else (-s, -t, -major)  # noqa: PLR2004
+            px, py, pz = (s, -t, major) if face == 4 else (-s, -t, -major)
         if abs(px) == size:
             face, s, t = (0, -pz, -py) if px > 0 else (1, pz, -py)
         elif abs(py) == size:

@@ -300,6 +300,7 @@ def fine_raster(
     with np.errstate(all="ignore"):
         for_parts(
             _draw_part, parts_of(len(drawn), _PART_TILES),
-            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, behind, True if samples > 1 else None, table,
+            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, behind, True if samples > 1 else None,
+            table,
         )  # fmt: skip
     return buffers, table

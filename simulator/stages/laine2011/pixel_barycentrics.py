@@ -42,7 +42,7 @@ def _values(p: Any, q: Any, r: Any, fx: Any, fy: Any, out: Any) -> Any:
     z = fma(r[2], a2, fma(p[2], a0, q[2] * a1))
     w = fma(r[3], a2, fma(p[3], a0, q[3] * a1))
     ratio = z / w
-    ratio = ratio if ratio < _ONE else _ONE  # NaN too
+    ratio = min(_ONE, ratio)  # NaN too
     out[0], out[1], out[2] = u * beyond, v * beyond, max(ratio, -_ONE)
     return inverse
 
@@ -115,7 +115,5 @@ def pixel_barycentrics(
     size = np.array([width, height], np.float32)
     steps = np.concatenate([_TWO / size, _ONE / size - _ONE])
     with np.errstate(all="ignore"):
-        for_parts(
-            _rows_part, parts_of(height, _PART_ROWS), ids, positions, triangles, steps, first, out, derivatives
-        )
+        for_parts(_rows_part, parts_of(height, _PART_ROWS), ids, positions, triangles, steps, first, out, derivatives)
     return out
