@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import as_array, as_triangles, need_axis, same_batch
+from tilestamp.simulator.nvdiffrast.arrays import Array, as_array, as_triangles, need_axis, same_batch
 from tilestamp.simulator.nvdiffrast.topology import TopologyHash, antialias_construct_topology_hash
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.laine2011.exact import fma
@@ -161,7 +161,7 @@ def _blend_part(part: int, parts: int, color: Any, shares: Any, out: Any) -> Non
 
 
 def antialias(
-    color: Any, rast: Any, pos: Any, tri: Any, topology_hash: TopologyHash | None = None
+    color: Array, rast: Array, pos: Array, tri: Array, topology_hash: TopologyHash | None = None
 ) -> NDArray[np.float32]:
     """Antialias silhouettes as ``nvdiffrast.torch.antialias`` does.
 

@@ -2,18 +2,33 @@
 
 import operator
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 
+
+class HasArray(Protocol):
+    """Of another library, with ``__array__``: a torch tensor on the CPU."""
+
+    def __array__(self) -> NDArray[Any]: ...
+
+
+class HasDLPack(Protocol):
+    """Of another library, with ``__dlpack__``."""
+
+    def __dlpack__(self) -> object: ...
+
+
+Array = NDArray[Any] | HasArray | HasDLPack
+
 Faults = Literal["kept", "mended"]
 """Whether a fault of the original is reproduced (the default everywhere) or set right."""
 
 
-def as_array(name: str, value: Any, dtype: Any, shape: str, *dimensions: int) -> NDArray[Any]:
+def as_array(name: str, value: object, dtype: type[np.generic], shape: str, *dimensions: int) -> NDArray[Any]:
     """Take an argument without a copy where its memory allows.
 
     Parameters
@@ -60,7 +75,7 @@ def need_axis(name: str, array: NDArray[Any], axis: int, length: int, shape: str
         raise TilestampError(f"{name} must be {array.dtype} {shape}, not {array.dtype} {list(array.shape)}")
 
 
-def as_triangles(tri: Any) -> NDArray[np.int32]:
+def as_triangles(tri: object) -> NDArray[np.int32]:
     """Take vertex indices, int32 [F, 3]; they may be out of range."""
     array = as_array("tri", tri, np.int32, "[F, 3]", 2)
     need_axis("tri", array, 1, 3, "[F, 3]")

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.nvdiffrast.arrays import Faults
+from tilestamp.simulator.nvdiffrast.arrays import Array, Faults
 from tilestamp.simulator.nvdiffrast.draw import Clip
 from tilestamp.simulator.nvdiffrast.rasterize import PEELERS, Batch, Depths, Raster
 
@@ -31,10 +31,10 @@ class DepthPeeler:
 
     def __init__(
         self,
-        pos: Any,
-        tri: Any,
+        pos: Array,
+        tri: Array,
         resolution: Iterable[int],
-        ranges: Any = None,
+        ranges: Array | None = None,
         grad_db: bool = True,
         *,
         clip: Clip = "2025",

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import as_array, as_triangles, need_axis, same_batch
+from tilestamp.simulator.nvdiffrast.arrays import Array, as_array, as_triangles, need_axis, same_batch
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.laine2011.exact import fma
 
@@ -76,10 +76,10 @@ def _rows_part(
 
 
 def interpolate(
-    attr: Any,
-    rast: Any,
-    tri: Any,
-    rast_db: Any = None,
+    attr: Array,
+    rast: Array,
+    tri: Array,
+    rast_db: Array | None = None,
     diff_attrs: Sequence[int] | Literal["all"] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Interpolate vertex attributes as ``nvdiffrast.torch.interpolate`` does.
@@ -119,16 +119,16 @@ def interpolate(
         same_batch(len(rast), len(images), "rast and attr")
     count = images.shape[2]
     diff = _listed(diff_attrs, count)
+    steps = rast  # not read without diff_attrs
     if diff_attrs is not None:
-        rast_db = as_array("rast_db (needed by diff_attrs)", rast_db, np.float32, "[B, H, W, 4]", 4)
-        if rast_db.shape != rast.shape:
-            raise TilestampError(f"rast_db {list(rast_db.shape)} must be as large as rast {list(rast.shape)}")
+        steps = as_array("rast_db (needed by diff_attrs)", rast_db, np.float32, "[B, H, W, 4]", 4)
+        if steps.shape != rast.shape:
+            raise TilestampError(f"rast_db {list(steps.shape)} must be as large as rast {list(rast.shape)}")
     out = np.zeros((*rast.shape[:3], count), np.float32)
     out_da = np.zeros((*rast.shape[:3], 2 * len(diff)), np.float32)
     parts = parts_of(-(-rast.shape[1] // GROUP_ROWS), 4)
     with np.errstate(all="ignore"):
         for b in range(len(rast)):
-            steps = rast if diff_attrs is None else rast_db  # not read without
             for_parts(_rows_part, parts, images[b % len(images)], rast[b], tri, steps[b], diff, out[b], out_da[b])
     return out, out_da
 

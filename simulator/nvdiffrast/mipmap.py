@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import as_array
+from tilestamp.simulator.nvdiffrast.arrays import Array, as_array
 from tilestamp.simulator.nvdiffrast.texels import cube_axes
 from tilestamp.simulator.stages.laine2011.exact import fma
 
@@ -48,7 +48,9 @@ def smaller_levels(tex: NDArray[np.float32], most: int | None) -> list[NDArray[n
     return levels[1:]
 
 
-def texture_construct_mip(tex: Any, max_mip_level: int | None = None, *, cube_mode: bool = False) -> list[NDArray[Any]]:
+def texture_construct_mip(
+    tex: Array, max_mip_level: int | None = None, *, cube_mode: bool = False
+) -> list[NDArray[Any]]:
     """Build the smaller levels of a texture once, for several calls of ``texture``.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.nvdiffrast.arrays import Faults, as_array, as_resolution, as_triangles, need_axis
+from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, as_array, as_resolution, as_triangles, need_axis
 from tilestamp.simulator.nvdiffrast.cost import priced
 from tilestamp.simulator.nvdiffrast.draw import UNCOUNTED, Clip, draw
 from tilestamp.simulator.run import Run
@@ -33,7 +33,9 @@ class Batch:
         As ``rasterize`` takes them.
     """
 
-    def __init__(self, pos: Any, tri: Any, resolution: Iterable[int], ranges: Any = None, clip: Clip = "2025") -> None:
+    def __init__(
+        self, pos: Array, tri: Array, resolution: Iterable[int], ranges: Array | None = None, clip: Clip = "2025"
+    ) -> None:
         self.pos = as_array("pos", pos, np.float32, "[B, V, 4] (or [V, 4] with ranges)", 2, 3)
         need_axis("pos", self.pos, -1, 4, "[B, V, 4] (or [V, 4] with ranges)")
         self.tri = as_triangles(tri)
@@ -79,10 +81,10 @@ class Batch:
 
 @overload
 def rasterize(
-    pos: Any,
-    tri: Any,
+    pos: Array,
+    tri: Array,
     resolution: Iterable[int],
-    ranges: Any = None,
+    ranges: Array | None = None,
     grad_db: bool = True,
     *,
     clip: Clip = "2025",
@@ -93,10 +95,10 @@ def rasterize(
 
 @overload
 def rasterize(
-    pos: Any,
-    tri: Any,
+    pos: Array,
+    tri: Array,
     resolution: Iterable[int],
-    ranges: Any = None,
+    ranges: Array | None = None,
     grad_db: bool = True,
     *,
     clip: Clip = "2025",
@@ -106,10 +108,10 @@ def rasterize(
 
 
 def rasterize(
-    pos: Any,
-    tri: Any,
+    pos: Array,
+    tri: Array,
     resolution: Iterable[int],
-    ranges: Any = None,
+    ranges: Array | None = None,
     grad_db: bool = True,
     *,
     clip: Clip = "2025",

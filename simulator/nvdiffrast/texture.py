@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import Faults, as_array, need_axis, same_batch
+from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, as_array, need_axis, same_batch
 from tilestamp.simulator.nvdiffrast.mipmap import (
     Mipmap,
     as_mipmap,
@@ -141,11 +141,11 @@ def _rows_part(
 
 
 def texture(
-    tex: Any,
-    uv: Any,
-    uv_da: Any = None,
-    mip_level_bias: Any = None,
-    mip: Sequence[Any] | None = None,
+    tex: Array,
+    uv: Array,
+    uv_da: Array | None = None,
+    mip_level_bias: Array | None = None,
+    mip: Sequence[Array] | None = None,
     filter_mode: Filter = "auto",
     boundary_mode: Boundary = "wrap",
     max_mip_level: int | None = None,
@@ -214,7 +214,7 @@ def _index(name: str, value: str, known: tuple[str, ...]) -> int:
     return known.index(value)
 
 
-def _check(tex: Any, uv: Any, *, cube: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _check(tex: Array, uv: Array, *, cube: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     shape = "[B, 6, H, H, C]" if cube else "[B, H, W, C]"
     tex = as_array("tex", tex, np.float32, shape, 5 if cube else 4)
     if cube and (tex.shape[1] != FACES or tex.shape[2] != tex.shape[3]):
@@ -227,7 +227,7 @@ def _check(tex: Any, uv: Any, *, cube: bool) -> tuple[NDArray[np.float32], NDArr
     return tex, uv
 
 
-def _per_pixel(name: str, value: Any, shape: tuple[int, ...], components: int) -> NDArray[np.float32] | None:
+def _per_pixel(name: str, value: Array | None, shape: tuple[int, ...], components: int) -> NDArray[np.float32] | None:
     """Take an array of the pixels of ``shape``, with so many components each (0: no axis of them)."""
     if value is None:
         return None
@@ -238,7 +238,7 @@ def _per_pixel(name: str, value: Any, shape: tuple[int, ...], components: int) -
     return array
 
 
-def _given_levels(tex: NDArray[np.float32], mip: Sequence[Any], most: int | None) -> list[NDArray[np.float32]]:
+def _given_levels(tex: NDArray[np.float32], mip: Sequence[Array], most: int | None) -> list[NDArray[np.float32]]:
     """Levels that the caller made: each half as large as the one before, down to 1."""
     levels, height, width = [], *tex.shape[-3:-1]
     for i, level in enumerate(mip if most is None else mip[:most], 1):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import as_triangles
+from tilestamp.simulator.nvdiffrast.arrays import Array, as_triangles
 
 NO_VERTEX = -1
 
@@ -17,7 +17,7 @@ class TopologyHash(NamedTuple):
     opposite: NDArray[np.int32]  # (F, 3) across the edge that vertex k is not of; -1 for none
 
 
-def antialias_construct_topology_hash(tri: Any) -> TopologyHash:
+def antialias_construct_topology_hash(tri: Array) -> TopologyHash:
     """Find which triangles share edges, once for several calls of ``antialias``.
 
     Parameters

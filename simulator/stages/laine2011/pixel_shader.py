@@ -52,7 +52,7 @@ def pixel_shader_work(ids: NDArray[np.int32], triangles: NDArray[np.int32], simt
     lanes = _by_warp(ids, simt.warp)
     drawn = lanes >= 0
     ordered = np.sort(lanes, axis=2)
-    some = (ordered >= 0).any(axis=2)
+    some = np.any(ordered >= 0, axis=2)
     distinct = (np.diff(ordered, axis=2) > 0).sum(axis=2) + some - (some & ~drawn.all(axis=2))
     E = PixelShaderEvent
     table = np.zeros((len(lanes), len(E)), np.int64)
