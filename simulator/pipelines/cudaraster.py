@@ -15,7 +15,7 @@ Not modelled
 ------------
 - Vertex shading: vertices come in clip space; the transform is free.
 - Which block draws which bin or batch: they take turns. No picture depends on it, only which streams are longest.
-- Sizes above 2048 pixels, ranges, depth peeling and derivatives of nvdiffrast.
+- Sizes above 2048 pixels; these, ranges, depth peeling and derivatives of nvdiffrast are in ``simulator.nvdiffrast``.
 - Copies between host and GPU.
 """
 
