@@ -16,12 +16,13 @@ WIDTH, HEIGHT = 96, 72
 
 @pytest.fixture(scope="module", params=pipeline_names())
 def run(request: pytest.FixtureRequest) -> Run:
-    """A small frame of the teapot by each pipeline, on a machine that can launch them all."""
+    """A small frame by each pipeline, of the teapot or of splats, on a machine that can launch them all."""
     return draw(request.param)
 
 
 def draw(pipeline: str, **options: object) -> Run:
-    return simulate("teapot", pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
+    scene = "playbot" if options_type(pipeline).splats else "teapot"
+    return simulate(scene, pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
 
 
 def test_the_picture_is_rows_of_rgb_bytes(run):

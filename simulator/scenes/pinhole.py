@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
+from tilestamp.simulator.scenes.camera import Camera, clip_matrix
 
-KEYS = ("tan_fovx", "tan_fovy", "view_row_major", "proj_view_row_major")
+VIEW_KEY = "view_row_major"
+KEYS = ("tan_fovx", "tan_fovy", VIEW_KEY, "proj_view_row_major")
 SKEW = 1e-4  # cosine of the angle between two axes that are still taken to be at right angles
 
 
@@ -37,11 +39,10 @@ class Pinhole:
     tan_y: np.float32
 
     @property
-    def eye(self) -> NDArray[np.float64]:
+    def eye(self) -> NDArray[np.floating]:
         """Where it stands, (3,)."""
         view = self.view.astype(np.float64)
-        place: NDArray[np.float64] = -np.linalg.solve(view[:3, :3], view[:3, 3])
-        return place
+        return -np.linalg.solve(view[:3, :3], view[:3, 3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +65,20 @@ class PinholeCamera:
         size = (int(fields["W"]), int(fields["H"])) if {"W", "H"} <= fields.keys() else None
         return cls(Pinhole(view, proj_view, tan_x, tan_y), size)
 
+    def pinhole_for(self, width: int, height: int) -> Pinhole:  # noqa: ARG002 - as it was given
+        """Give it as it is."""
+        return self.pinhole
+
     def matrix(self, width: int, height: int) -> NDArray[np.float64]:  # noqa: ARG002 - the tangents know the screen
         """Model-to-clip matrix of y up, (4, 4) float64: by what other pipelines see the same view."""
-        matrix = self.pinhole.proj_view.astype(np.float64)
-        return matrix * np.array([[1.0], [-1.0], [1.0], [1.0]])
+        matrix: NDArray[np.float64] = self.pinhole.proj_view * np.array([[1.0], [-1.0], [1.0], [1.0]])
+        return matrix
+
+
+def pinhole_camera(camera: Camera, width: int, height: int) -> Pinhole:
+    """Pinhole of any camera for an image; raises TilestampError where it is none."""
+    own = getattr(camera, "pinhole_for", None)
+    return own(width, height) if own is not None else pinhole_of(clip_matrix(camera, width, height))
 
 
 def pinhole_of(matrix: NDArray[np.float64]) -> Pinhole:

@@ -10,23 +10,32 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.kerbl2023 import blend_walk as group
+from tilestamp.simulator.stages.kerbl2023.blend_block import (
+    CONIC_BYTES,
+    INDEX_BYTES,
+    POSITION_BYTES,
+    Block,
+    Room,
+    block_of,
+    count_rounds,
+    gather_sectors,
+)
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
     ENTRY,
+    ENTRY_RED,
+    GX,
     LANES,
     LAST,
     RED,
     ROWS,
     TRANSMITTANCE,
     A,
-    ENTRY_RED,
-    GX,
     X,
     Y,
 )
@@ -37,7 +46,6 @@ from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
 from tilestamp.simulator.stages.laine2011.exact import fma
 from tilestamp.simulator.work import Work
 
-INDEX_BYTES, POSITION_BYTES, CONIC_BYTES = 4, 8, 16
 SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
 COLOURS, PLANES = 3, 5  # floats that a blend reads; words that a pixel stores
 _PART = 8  # tiles, at least
@@ -60,30 +68,6 @@ class Pixels(NamedTuple):
     colours: NDArray[np.float32]
     transmittance: NDArray[np.float32]
     reached: NDArray[np.uint32]
-
-
-class Block(NamedTuple):
-    """A block and its machine, as kernels take it."""
-
-    threads: int
-    pixels: int  # a thread
-    warp: int
-    warps: int
-    segment: int  # bytes of the smallest transaction
-    parts: int  # of 32 lanes in a warp
-
-
-class Room(NamedTuple):
-    """Working memory of one thread of this computer."""
-
-    entries: NDArray[np.float32]  # (longest list, ENTRY)
-    boxes: NDArray[np.int64]
-    state: NDArray[np.float32]  # (ROWS, lanes)
-    alive: NDArray[np.uint32]
-    rounds: NDArray[np.int64]  # (warps, pixels a thread, rounds, PER_ROUND)
-    totals: NDArray[np.int64]  # (warps, pixels a thread, TOTALS)
-    marks: NDArray[np.uint8]  # (longest list,)
-    stamps: NDArray[np.int64]  # (2, sectors of the conics): by which gather a sector was touched last
 
 
 @kernel(lent=True)
@@ -152,73 +136,23 @@ def _store(
 
 
 @kernel(lent=True)
-def _gather_sectors(first: int, count: int, listed: Any, block: Block, room: Room, tile: int) -> int:
-    """Transactions of the loads of entries: indices, positions and conics, by warp and round."""
-    sectors = 0
-    for begin in range(0, count, block.threads):
-        for start in range(begin, min(begin + block.threads, count), block.warp):
-            end = min(start + block.warp, begin + block.threads, count)
-            low, high = (first + start) * INDEX_BYTES, (first + end) * INDEX_BYTES - 1
-            sectors += high // block.segment - low // block.segment + 1
-            stamp = first + start + 1
-            for k in range(start, end):
-                i = np.int64(listed[first + k])
-                for size, stamps in ((POSITION_BYTES, room.stamps[0]), (CONIC_BYTES, room.stamps[1])):
-                    place = i * size // block.segment
-                    sectors += stamps[place] != stamp
-                    stamps[place] = stamp
-    return sectors
-
-
-@kernel(lent=True)
-def _count_rounds(count: int, block: Block, room: Room, row: Any) -> None:
-    """Rounds of the block and its warps, and in each the warp that the others wait for."""
-    longest = 0
-    for warp in range(block.warps):
-        trips = 0
-        for slot in range(block.pixels):
-            trips = max(trips, room.totals[warp, slot, group.TRIPS])
-        row[_E.TRIPS] += trips
-        row[_E.WARP_BATCHES] += (trips + block.threads - 1) // block.threads
-        longest = max(longest, trips)
-    row[_E.BATCHES] = (longest + block.threads - 1) // block.threads
-    row[_E.ENTRIES] = min(count, row[_E.BATCHES] * block.threads)
-    row[_E.LEFT] = row[_E.ENTRIES] < count
-    for k in range(row[_E.BATCHES]):
-        begin, worst = k * block.threads, -1
-        slowest = (0, 0, 0, 0)
-        for warp in range(block.warps):
-            trips, steps, blends, runs = 0, 0, 0, 0
-            for slot in range(block.pixels):
-                here = min(max(room.totals[warp, slot, group.TRIPS] - begin, 0), block.threads)
-                trips, steps = max(trips, here), steps + here
-                blends += room.rounds[warp, slot, k, group.ROUND_BLENDS]
-                runs += room.rounds[warp, slot, k, group.ROUND_RUNS]
-            if steps + blends > worst:
-                worst, slowest = steps + blends, (trips, steps, blends, runs)
-        for i in range(4):
-            row[_E.SLOWEST_TRIPS + i] += slowest[i]
-
-
-@kernel(lent=True)
 def _tile(
-    tile: int, tiles: Tiles, block: Block, first: int, count: int, background: Any, room: Room, pixels: Pixels,
-    row: Any,
+    tile: int, tiles: Tiles, block: Block, count: int, background: Any, room: Room, pixels: Pixels, row: Any
 ) -> None:  # fmt: skip
     """Blend the list of one tile."""
     rounds = (count + block.threads - 1) // block.threads
     room.rounds[:, :, :rounds] = 0
     room.totals[:] = 0
+    room.marks[:count] = 0
     lasts = room.state.view(np.int32)
     for warp in range(block.warps):
-        if block.pixels > 1:
-            room.marks[:count] = 0
+        bit = np.uint32(1) << np.uint32(warp)
         for slot in range(block.pixels):
             rectangle = _place(tile, tiles, block, slot, warp, room)
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
-                room.rounds[warp, slot], room.marks, totals,
+                room.rounds[warp, slot], room.marks, bit, totals,
             )  # fmt: skip
             _store(tile, tiles, block, slot, warp, background, room, pixels, row)
             if row is not None:
@@ -230,10 +164,6 @@ def _tile(
                 row[_E.BLENDED] += totals[group.BLENDED]
                 row[_E.SKIPPED_POWER] += totals[group.SKIPPED_POWER]
                 row[_E.STOPPED] += totals[group.STOPPED]
-                if block.pixels == 1:
-                    row[_E.BLEND_TRIPS] += totals[group.BLEND_STEPS]
-        if row is not None and block.pixels > 1:
-            row[_E.BLEND_TRIPS] += room.marks[:count].sum()
 
 
 @kernel
@@ -251,7 +181,7 @@ def _blend(
         np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int64), np.empty((ROWS, lanes), np.float32),
         np.empty(block.parts, np.uint32),
         np.empty((block.warps, block.pixels, longest // block.threads + 1, PER_ROUND), np.int64),
-        np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint8),
+        np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint32),
         np.zeros((2, len(out.radii) * CONIC_BYTES // block.segment + 1 if table is not None else 1), np.int64),
     )  # fmt: skip
     for i in range(begin, end):
@@ -259,26 +189,19 @@ def _blend(
         first, count = starts[tile], starts[tile + 1] - starts[tile]
         row = None if table is None else table[i]
         _load(first, count, listed, out, colours, room)
-        _tile(tile, tiles, block, first, count, background, room, pixels, row)
+        _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
-            _count_rounds(count, block, room, row)
+            count_rounds(count, block, room, row)
             row[_E.SKIPPED_ALPHA] = row[_E.EXP_LANES] - row[_E.BLENDED] - row[_E.STOPPED]
             row[_E.IDLE_LANES] = row[_E.STEPS] * block.warp - row[_E.EVALUATIONS]
             fetched = row[_E.ENTRIES]
             for size in range(0, fetched, block.threads):
                 row[_E.GATHER_WARPS] += (min(block.threads, fetched - size) + block.warp - 1) // block.warp
-            gathers = _gather_sectors(first, fetched, listed, block, room, tile)
+            gathers = gather_sectors(first, fetched, listed, block, room)
             row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + block.warps
             row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * block.segment
             row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * block.segment
-
-
-def block_of(tiles: Tiles, threads: int, simt: Simt) -> Block:
-    """Give the block of a tile."""
-    segment = smallest_transaction_bytes(int(simt.coalescing))
-    warps = -(-threads // simt.warp)
-    return Block(threads, tiles.pixels // threads, simt.warp, warps, segment, -(-min(simt.warp, threads) // LANES))
 
 
 def blend(

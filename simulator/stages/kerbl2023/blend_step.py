@@ -62,7 +62,7 @@ def blend_step(state: Any, lasts: Any, first: int, alive: Any, entry: Any, numbe
             unbounded |= 1 << lane
             continue
         product = entry[OPACITY] * exp32(power)
-        alpha = product if product < MOST_ALPHA else MOST_ALPHA
+        alpha = min(MOST_ALPHA, product)
         if alpha < LEAST_ALPHA:
             continue
         left = state[TRANSMITTANCE, at] * (np.float32(1) - alpha)
@@ -144,7 +144,8 @@ def _step(builder: Any, base: Any, stride: Any, alive: Any, entry: Any, number: 
     living = b.bitcast(alive, bits)
     bounded = b.fcmp_unordered("<=", power, v.all(0.0, floats))
     product = b.fmul(e[OPACITY], v.exp(power))
-    alpha = b.select(b.fcmp_ordered("<", product, v.all(float(MOST_ALPHA), floats)), product, v.all(float(MOST_ALPHA), floats))
+    most = v.all(float(MOST_ALPHA), floats)
+    alpha = b.select(b.fcmp_ordered("<", product, most), product, most)
     seen = b.and_(b.and_(living, bounded), b.fcmp_unordered(">=", alpha, v.all(float(LEAST_ALPHA), floats)))
     unbounded = b.bitcast(b.and_(living, b.not_(bounded)), word)
     results = [cgutils.alloca_once_value(b, ir.Constant(word, 0)) for _ in range(2)]
@@ -183,8 +184,8 @@ def _llvm_step(_context: Any, state: Any, first: Any, alive: Any, entry: Any, nu
 
 
 @overload(blend_step)
-def _blend_step(state, lasts, first, alive, entry, number):  # type: ignore[no-untyped-def]  # noqa: ARG001, PLR0913
-    def compiled(state, lasts, first, alive, entry, number):  # type: ignore[no-untyped-def]  # noqa: ARG001, PLR0913
+def _blend_step(state, lasts, first, alive, entry, number):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
+    def compiled(state, lasts, first, alive, entry, number):  # type: ignore[no-untyped-def]  # noqa: ARG001 - as above
         return _llvm_step(state, np.intp(first), np.uint32(alive), entry, np.int32(number))
 
     return compiled

@@ -1,7 +1,7 @@
 """A warp's pixels of a tile walk along its list until all of them are done.
 
-What runs here is smarter than what is charged: an entry is evaluated only where the box around its alpha cut-off, made a
-little larger, reaches the pixels; elsewhere each evaluation is counted as one whose alpha is too small.
+What runs here is smarter than what is charged: an entry is evaluated only where the box around its alpha cut-off, made
+a little larger, reaches the pixels; elsewhere each evaluation is counted as one whose alpha is too small.
 """
 
 from typing import Any
@@ -10,15 +10,14 @@ import numpy as np
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
-    ENTRY,
+    GX,
+    GY,
     LANES,
     LEAST_ALPHA,
+    OPACITY,
     A,
     B,
     C,
-    GX,
-    GY,
-    OPACITY,
     blend_step,
 )
 from tilestamp.models.bits import popcount
@@ -58,7 +57,7 @@ def reach_box(entry: Any, box: Any) -> None:
 @kernel(lent=True)
 def walk(
     entries: Any, boxes: Any, count: int, state: Any, lasts: Any, alive: Any, rectangle: Any, batch: int,
-    per_round: Any, marks: Any, totals: Any,
+    per_round: Any, marks: Any, bit: Any, totals: Any,
 ) -> None:  # fmt: skip
     """Walk along a list.
 
@@ -78,8 +77,9 @@ def walk(
         Entries a round.
     per_round : ndarray, (rounds, PER_ROUND), int64
         Added to.
-    marks : ndarray, (>= count,), uint8, or None
-        Set to 1 where an entry blends.
+    marks : ndarray, (>= count,), uint32
+        Of each entry a bit for each warp in which it blends; those of ``bit`` are set.
+    bit : uint32
     totals : ndarray, (TOTALS,), int64
         Added to.
     """
@@ -114,8 +114,7 @@ def walk(
                 per_round[k // batch, ROUND_BLENDS] += 1
                 per_round[k // batch, ROUND_RUNS] += k != blended_before + 1
                 blended_before = k
-                if marks is not None:
-                    marks[k] = 1
+                marks[k] |= bit
         totals[EXP_LANES] += exp_lanes
         totals[EXP_STEPS] += exp_lanes > 0
         k += 1

@@ -1,7 +1,7 @@
 """Duplicate: one thread a Gaussian writes a pair of key and index for each tile that lists it.
 
-A key is the tile above the bits of the depth, which is positive: in the order of keys, tiles lie one behind another and
-each from near to far. A thread writes its pairs one behind another, so that the lanes of a warp write to as many places.
+A key is the tile above the bits of the depth, which is positive: in the order of keys, tiles lie one behind another
+and each from near to far. A thread writes its pairs one behind another, so that lanes of a warp write to many places.
 """
 
 from typing import Any, NamedTuple
@@ -58,7 +58,8 @@ def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, 
             keys[at] = (np.uint64(row * tiles.columns + column) << np.uint64(32)) | depth
             values[at] = i
             at += 1
-    return max(0, last_row - first_row + 1)
+    rows: int = max(0, last_row - first_row + 1)
+    return rows
 
 
 @kernel(lent=True)
@@ -136,9 +137,7 @@ def _duplicate(
                     rows[lane] = _write(i, ends[i - 1] if i else 0, out, bound, tiles, keys, values)
             if table is not None:
                 tight = int(bound != SQUARE)
-                _count_warp(
-                    first, lanes, warp, ends, rows, out.radii, tight, active, scratch, rule, table[block]
-                )
+                _count_warp(first, lanes, warp, ends, rows, out.radii, tight, active, scratch, rule, table[block])
         if table is not None:
             table[block, _E.BLOCKS] = 1
 

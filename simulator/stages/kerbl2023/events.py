@@ -93,6 +93,8 @@ class SortEvent(IntEnum):
     STORE_BYTES = 7
     BLOCKS = 8
     PASSES = 9  # digits a key that the block looks at: all in the histogram, else 1
+    ALIKE = 10  # 1 where all pairs of the block have one digit: a short way
+    MIXED = 11  # 1 where they have several
 
 
 @shown(count("LISTED_TILES", "tiles with pairs"))
@@ -143,15 +145,17 @@ class BlendEvent(IntEnum):
     SKIPPED_ALPHA = 16  # alpha below 1/255
     STOPPED = 17  # the pixel would grow opaque: it is done
     IDLE_LANES = 18  # lanes of the steps that are done or off screen
-    SLOWEST_TRIPS = 19  # of each round, the warp of most trips and blending steps: its trips
+    SLOWEST_TRIPS = 19  # of each round, the warp with most steps, blending ones three times: its trips
     SLOWEST_STEPS = 20  # its steps
     SLOWEST_BLEND_STEPS = 21  # its blending steps
     SLOWEST_RUNS = 22  # its blending steps that follow one that does not blend
-    LEFT = 23  # 1 where all pixels were done before the end of the list
-    PIXELS = 24  # on the screen
-    PIXEL_WARPS = 25  # stores of a pixel by a warp: steps of the last part of the kernel
-    LOAD_TRANSACTIONS = 26
-    LOAD_BYTES = 27
-    STORE_TRANSACTIONS = 28
-    STORE_BYTES = 29
-    BLOCKS = 30
+    SLOWEST_OWN_BLENDS = 23  # its entries that no other warp blends: their colours were not fetched before
+    COLOUR_FETCHES = 24  # entries that some warp blends
+    LEFT = 25  # 1 where all pixels were done before the end of the list
+    PIXELS = 26  # on the screen
+    PIXEL_WARPS = 27  # stores of a pixel by a warp: steps of the last part of the kernel
+    LOAD_TRANSACTIONS = 28
+    LOAD_BYTES = 29
+    STORE_TRANSACTIONS = 30
+    STORE_BYTES = 31
+    BLOCKS = 32

@@ -1,7 +1,7 @@
 """Correctly rounded exp in float32, in plain Python; ``blend_step`` has the same as vector code.
 
-exp is a polynomial in float64 with a relative error of 2e-16, rounded once: among the floats of the loop a wrong rounding
-is expected in none of 10^8. The GPU's own exp is within 1 ulp of it, and no decision was seen to depend on that.
+exp is a polynomial in float64 with a relative error of 2e-16, rounded once: among the floats of the loop a wrong
+rounding is expected in none of 10^8. The GPU's own exp is within 1 ulp of it.
 """
 
 from typing import Any

@@ -93,7 +93,7 @@ def three_sigmas(cxx: Any, cyy: Any, det: Any) -> Any:
     """Half the side of the square around a Gaussian, in whole pixels as a float."""
     middle = _HALF * (cxx + cyy)
     spread = fma(middle, middle, -det)
-    root = np.sqrt(spread if spread > LEAST else LEAST)
+    root = np.sqrt(max(LEAST, spread))
     return np.ceil(SIGMAS * np.sqrt(max(middle + root, middle - root)))
 
 

@@ -1,6 +1,6 @@
 """Project: one thread a Gaussian finds its depth, its ellipse on the screen and the tiles of its square.
 
-Three exits: nearer than 0.2, a determinant of exactly zero, no tile on the screen. What is culled keeps a radius of zero.
+Three exits: nearer than 0.2, a determinant of exactly zero, no tile on the screen. What is culled has a radius of 0.
 """
 
 from typing import Any, NamedTuple
@@ -32,8 +32,8 @@ from tilestamp.simulator.stages.laine2011.exact import fma
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
-# What lanes touch: how far they have got (0 all, 1 behind the near test, 2 with a determinant, 3 visible), whether it is
-# a store, bytes of a record, instructions, and the bytes of each. A matrix is the same for all lanes.
+# What lanes touch: how far they have got (0 all, 1 behind the near test, 2 with a determinant, 3 visible), whether it
+# is a store, bytes of a record, instructions, and the bytes of each. A matrix is the same for all lanes.
 ACCESSES = (
     (0, 0, 12, 3, 4), (0, 1, 4, 1, 4), (0, 1, 4, 1, 4), (0, 0, 0, 4, 4),
     (1, 0, 0, 28, 4), (1, 0, 12, 3, 4), (1, 0, 16, 4, 4), (1, 1, 24, 6, 4),
@@ -155,9 +155,7 @@ def _project(
         for first in range(block * BLOCK, end, warp):
             lanes = min(warp, end - first)
             for lane in range(lanes):
-                reached[lane] = _gaussian(
-                    first + lane, means, scales, rotations, opacities, lens, tiles, out, space
-                )
+                reached[lane] = _gaussian(first + lane, means, scales, rotations, opacities, lens, tiles, out, space)
             if table is not None:
                 _count_warp(first, lanes, reached, active, scratch, rule, table[block])
         if table is not None:

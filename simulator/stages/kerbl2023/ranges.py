@@ -22,18 +22,18 @@ _E = RangesEvent
 @kernel
 def _ranges(keys: Any, starts: Any, warp: int, table: Any) -> None:
     """Fill ``starts``; a thread whose pair is of another tile than the one before stores both ends."""
-    tile, before = 0, 0
-    last_warp = -1
+    tile = last_warp = 0
+    before = np.int64(-1)
     for i in range(len(keys)):
         here = np.int64(keys[i] >> np.uint64(DEPTH_BITS))
         while tile <= here:
             starts[tile] = i
             tile += 1
-        if table is not None and (i == 0 or here != before):
+        if table is not None and here != before:
             row = table[i // BLOCK]
             row[_E.LISTED_TILES] += 1
-            row[_E.EDGE_WARPS] += i // warp != last_warp
-            last_warp = i // warp
+            row[_E.EDGE_WARPS] += i // warp + 1 != last_warp
+            last_warp = i // warp + 1
             row[_E.STORE_TRANSACTIONS] += 2 if i else 1
         before = here
     starts[tile:] = len(keys)

@@ -13,7 +13,8 @@ WORD_BYTES = 4
 def rising_transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
     """``transactions`` of lanes whose addresses never fall, inactive ones (negative) left out."""
     if rule == HALF_WARP_SEGMENTS:
-        return transactions(addresses, lanes, access_bytes, rule)
+        found: tuple[int, int] = transactions(addresses, lanes, access_bytes, rule)
+        return found
     segment, request = SECTOR_BYTES, lanes
     if rule == LINES:
         segment = SEGMENT_BYTES

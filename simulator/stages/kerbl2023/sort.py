@@ -1,4 +1,4 @@
-"""Sort: pairs by their keys, radix sort by digits of 8 bits from the lowest (as CUB launches it: Adinets & Merrill 2022).
+"""Sort: pairs by their keys, a radix sort by digits of 8 bits, lowest first (Adinets & Merrill 2022, as in CUB).
 
 One kernel counts the digits of all passes, one sums them up; then each pass reads the pairs once, in blocks of 5,760,
 and writes each to its place: the pairs of a block that have a digit in common lie one behind another, a run. Pairs of
@@ -100,6 +100,7 @@ def _count_runs(counts: Any, starts: Any, pairs: int, warp: int, table: Any) -> 
                     first = starts[block, digit] * width // SECTOR_BYTES
                     last = ((starts[block, digit] + count) * width - 1) // SECTOR_BYTES
                     row[_E.STORE_TRANSACTIONS] += last - first + 1
+        row[_E.ALIKE], row[_E.MIXED] = row[_E.DIGITS] == 1, row[_E.DIGITS] > 1
         row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * SECTOR_BYTES
         row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * SECTOR_BYTES
 

@@ -44,7 +44,8 @@ def _tight_count(
     """Count the tiles of a part of the blocks."""
     count = len(counts)
     active, scratch = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
-    for i in range(count * part // parts // BLOCK * BLOCK, count if part + 1 == parts else count * (part + 1) // parts // BLOCK * BLOCK, warp):
+    blocks = (count + BLOCK - 1) // BLOCK
+    for i in range(blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, count), warp):
         lanes = min(warp, count - i)
         visible, opaque, rows, longest, pairs = 0, 0, 0, 0, 0
         for lane in range(warp):

@@ -1,8 +1,8 @@
 """Which tiles list a Gaussian: the published square, or what the alpha cut-off of 1/255 leaves of it.
 
-``SQUARE``: all tiles of the square of three sigmas. ``BOX``: those of the box around the ellipse on which alpha is 1/255
-(or of 3.33 sigmas, where that is smaller). ``ELLIPSE``: those that the ellipse itself touches, row by row; in use since
-2025 (Speedy-Splat, gsplat). Box and ellipse are float32, each operation rounded by itself.
+``SQUARE``: all tiles of the square of three sigmas. ``BOX``: those of the box around the ellipse on which alpha is
+1/255 (or of 3.33 sigmas, where that is smaller). ``ELLIPSE``: those that the ellipse itself touches, row by row; in use
+since 2025 (Speedy-Splat, gsplat). Box and ellipse are float32, each operation rounded by itself.
 """
 
 from typing import Any
