@@ -195,10 +195,9 @@ def _blend(
             count_rounds(count, block, room, row)
             row[_E.SKIPPED_ALPHA] = row[_E.EXP_LANES] - row[_E.BLENDED] - row[_E.STOPPED]
             row[_E.IDLE_LANES] = row[_E.STEPS] * block.warp - row[_E.EVALUATIONS]
-            fetched = row[_E.ENTRIES]
-            for size in range(0, fetched, block.threads):
-                row[_E.GATHER_WARPS] += (min(block.threads, fetched - size) + block.warp - 1) // block.warp
-            gathers = gather_sectors(first, fetched, listed, block, room)
+            for size in range(0, row[_E.ENTRIES], block.threads):
+                row[_E.GATHER_WARPS] += (min(block.threads, row[_E.ENTRIES] - size) + block.warp - 1) // block.warp
+            gathers = gather_sectors(first, row[_E.ENTRIES], listed, block, room)
             row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + block.warps
             row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * block.segment
             row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * block.segment

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import popcount
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
@@ -12,7 +13,6 @@ from tilestamp.simulator.stages.kerbl2023 import blend_walk as group
 from tilestamp.simulator.stages.kerbl2023.blend_step import LANES
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
-from tilestamp.models.bits import popcount
 
 INDEX_BYTES, POSITION_BYTES, CONIC_BYTES = 4, 8, 16
 BLEND_WEIGHT = 2  # a step that blends takes about three times as long as one that does not
@@ -96,8 +96,10 @@ def count_rounds(count: int, block: Block, room: Room, row: Any) -> None:
             if steps + BLEND_WEIGHT * blends > worst:
                 worst, slowest = steps + BLEND_WEIGHT * blends, (trips, steps, blends, runs)
                 bit = np.uint32(1) << np.uint32(warp)
-        for i in range(4):
-            row[_E.SLOWEST_TRIPS + i] += slowest[i]
+        row[_E.SLOWEST_TRIPS] += slowest[0]
+        row[_E.SLOWEST_STEPS] += slowest[1]
+        row[_E.SLOWEST_BLEND_STEPS] += slowest[2]
+        row[_E.SLOWEST_RUNS] += slowest[3]
         for entry in range(begin, min(begin + block.threads, count)):
             mark = room.marks[entry]
             row[_E.BLEND_TRIPS] += popcount(np.uint64(mark))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
     GX,
@@ -20,7 +21,6 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import (
     C,
     blend_step,
 )
-from tilestamp.models.bits import popcount
 
 BOX = 4  # first and last column and row of pixels
 NOWHERE, EVERYWHERE = 1 << 30, 1 << 29

@@ -73,9 +73,12 @@ def _count_trips(first: int, lanes: int, trips: int, ends: Any, scratch: Any, ru
             scratch[2, lane] = (first + lane) * 4 if here < ends[first + lane] else -1
         for access in range(3):
             n, size = rising_transactions(scratch[access], lanes, 4 if access else KEY_BYTES, rule)
-            op = _E.LOAD_TRANSACTIONS if access == 2 else _E.STORE_TRANSACTIONS
-            row[op] += n
-            row[op + 1] += size
+            if access == 2:
+                row[_E.LOAD_TRANSACTIONS] += n
+                row[_E.LOAD_BYTES] += size
+            else:
+                row[_E.STORE_TRANSACTIONS] += n
+                row[_E.STORE_BYTES] += size
 
 
 @kernel(lent=True)

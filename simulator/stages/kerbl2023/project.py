@@ -121,24 +121,32 @@ def _count_warp(first: int, lanes: int, reached: Any, active: Any, scratch: Any,
     """Events of one warp, whose lanes got as far as ``reached`` says."""
     row[_E.WARPS] += 1
     row[_E.GAUSSIANS] += lanes
+    far = square = visible = 0
     for lane in range(lanes):
-        row[_E.CULLED_NEAR + min(reached[lane], 3)] += reached[lane] < 3
+        far += reached[lane] > 0
+        square += reached[lane] > 1
+        visible += reached[lane] > 2
+    row[_E.NEAR_WARPS] += far > 0
+    row[_E.NEAR_LANES] += far
+    row[_E.SQUARE_WARPS] += square > 0
+    row[_E.SQUARE_LANES] += square
+    row[_E.VISIBLE_WARPS] += visible > 0
+    row[_E.VISIBLE] += visible
+    row[_E.CULLED_NEAR] += lanes - far
+    row[_E.CULLED_DETERMINANT] += far - square
+    row[_E.CULLED_SCREEN] += square - visible
     for level in range(4):
-        lanes_there = 0
         for lane in range(len(active)):
             active[lane] = lane < lanes and reached[lane] >= level
-            lanes_there += active[lane]
-        if level:
-            row[_E.WARPS + 2 * level] += lanes_there > 0
-            row[_E.GAUSSIANS + 2 * level] += lanes_there
-        if not lanes_there:
-            break
         for record in ACCESSES:
             if record[0] == level:
                 n, size = record_sectors(active, len(active), first, record[2], record[3], record[4], rule, scratch)
-                op = _E.STORE_TRANSACTIONS if record[1] else _E.LOAD_TRANSACTIONS
-                row[op] += n
-                row[op + 1] += size
+                if record[1]:
+                    row[_E.STORE_TRANSACTIONS] += n
+                    row[_E.STORE_BYTES] += size
+                else:
+                    row[_E.LOAD_TRANSACTIONS] += n
+                    row[_E.LOAD_BYTES] += size
 
 
 @kernel
