@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba import get_num_threads, set_num_threads
 
+from tests.drawable import scene_for
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
@@ -21,8 +22,7 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def draw(pipeline: str, **options: object) -> Run:
-    scene = "playbot" if options_type(pipeline).splats else "teapot"
-    return simulate(scene, pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
+    return simulate(scene_for(pipeline), pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
 
 
 def test_the_picture_is_rows_of_rgb_bytes(run):
