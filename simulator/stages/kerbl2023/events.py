@@ -113,9 +113,9 @@ class RangesEvent(IntEnum):
 
 
 @shown(
-    count("EVALUATIONS", "Gaussians evaluated at a pixel"),
-    count("BLENDED", "evaluations that were blended"),
-    ratio("splat_ste", "BLENDED", "EVALUATIONS", "share of the evaluations that were blended"),
+    count("EVALUATIONS", "evaluations of a Gaussian at a pixel", "sample_tests"),
+    count("BLENDED", "evaluations that were blended", "sample_hits"),
+    ratio("ste", "BLENDED", "EVALUATIONS", "sample test efficiency: evaluations that were blended by all"),
     count("STOPPED", "pixels that grew opaque"),
     distribution("list", "LIST", "Gaussians in the list of a tile"),
 )
