@@ -20,7 +20,7 @@ def heat_map(
     title: str,
     unit: str,
     size: tuple[int, int],
-    tile: int = 1,
+    tile: int | tuple[int, int] = 1,
     from_below: bool = False,
 ) -> "Axes":
     """Draw ``counts`` over the screen with a colour bar.
@@ -35,8 +35,8 @@ def heat_map(
         What a cell counts.
     size : tuple of int
         Width and height of the screen in pixels: the axes.
-    tile : int
-        Pixels on a side of a cell. What of the cells lies outside the screen is not shown.
+    tile : int, or tuple of two
+        Pixels on a side of a cell, or its width and height. What of the cells lies outside the screen is not shown.
     from_below : bool
         Whether the cells begin at the bottom of the screen.
     """
@@ -59,8 +59,11 @@ def heat_map(
     return drawn
 
 
-def extent(cells: tuple[int, ...], height: int, tile: int, *, from_below: bool) -> tuple[int, int, int, int]:
+def extent(
+    cells: tuple[int, ...], height: int, tile: int | tuple[int, int], *, from_below: bool
+) -> tuple[int, int, int, int]:
     """Left, right, bottom and top of a map of (rows, columns) cells, in pixels from the screen's top left corner."""
-    rows, columns = tile * cells[0], tile * cells[1]
+    width, rise = (tile, tile) if isinstance(tile, int) else tile
+    rows, columns = rise * cells[0], width * cells[1]
     top = height - rows if from_below else 0
     return 0, columns, top + rows, top

@@ -39,10 +39,12 @@ class Frame:
         What a report may say besides: queue lengths, memory, retries, what was given up.
     warnings : tuple of str
         Sentences on what the picture lacks or shows wrong.
-    tile : int
-        Pixels on a side of a tile, for maps that have a cell a tile.
+    tile : int, or tuple of two
+        Pixels on a side of a tile, or its width and height, for maps that have a cell a tile.
     tiles_from_below : bool
         Whether tiles begin at the bottom row: a height that is no multiple of theirs then cuts the top row.
+    buffers : dict of str to ndarray
+        What kernels hand on, by name, where a pipeline keeps it for those who look inside.
     """
 
     image: NDArray[np.uint8]
@@ -52,8 +54,9 @@ class Frame:
     maps: dict[str, NDArray[Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    tile: int = 1
+    tile: int | tuple[int, int] = 1
     tiles_from_below: bool = False
+    buffers: dict[str, NDArray[Any]] = field(default_factory=dict, repr=False)
     _mixed: dict[tuple[str, str, int], MixedWorks] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def mixed(self, pipeline: str, machine: Machine) -> MixedWorks:

@@ -11,6 +11,7 @@ from tilestamp.models.occupancy import residency
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.options import Options, choices, plain
 from tilestamp.simulator.pipelines import pipeline_options
+from tilestamp.simulator.scenes.scene import Scene
 
 MANY = 6  # values that a sentence names one by one
 MOST = 256  # values of an option that are tried one by one
@@ -36,6 +37,16 @@ def check_launches(pipeline: str, options: Options, machine: Machine) -> None:
         others = f"; {listed(able[:PROPOSED])} can run it" if able else ""
         instead = {"machine": able[0]} if able else {}
         raise UnableError(f"{error}{'; it can launch ' if cure else ''}{cure}{others}", **instead) from None
+
+
+def check_scene(pipeline: str, options: Options, scene: Scene) -> None:
+    """Refuse splats where a pipeline draws triangles or patches, and those where it draws splats."""
+    if options.splats and scene.splats is None:
+        raise UnableError(f"the pipeline {pipeline} draws splats, and {scene.name} has none")
+    if scene.splats is not None and not options.splats:
+        raise UnableError(
+            f"the pipeline {pipeline} draws no splats, and {scene.name} has nothing else; splat can", pipeline="splat"
+        )
 
 
 def able_machines(pipeline: str, options: Options) -> Iterator[str]:

@@ -74,7 +74,7 @@ def source_digest() -> str:
 def scene_digest(scene: Scene) -> str:
     """Digest of what a scene holds, whatever its name: all arrays with their types and shapes."""
     digest = hashlib.sha256()
-    for array in _arrays((scene.patches, scene.mesh)):
+    for array in _arrays((scene.patches, scene.mesh, *filter(None, [scene.splats]))):
         digest.update(f"{array.dtype}{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:DIGITS]
 

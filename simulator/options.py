@@ -45,6 +45,8 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     """Heat maps that it makes beside the picture, and what each shows."""
     patches: ClassVar[bool] = False
     """Whether it draws nothing but patches."""
+    splats: ClassVar[bool] = False
+    """Whether it draws splats, and nothing else."""
     textures: ClassVar[bool] = False
     """Whether it shows the textures of a mesh."""
     fixed_function: ClassVar[bool] = False

@@ -10,7 +10,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.launchable import check_launches
+from tilestamp.simulator.launchable import check_launches, check_scene
 from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import Options, plain
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
@@ -20,6 +20,7 @@ from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.scenes.camera import clip_matrix
 from tilestamp.simulator.scenes.camera_files import CameraSource
+from tilestamp.simulator.scenes.pinhole import pinhole_camera
 
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
 
@@ -88,14 +89,17 @@ def simulate(
     if chosen.votes or (drawing.fidelity != "counts" and counting):
         check_launches(pipeline, chosen, machine)
     scene = load_scene(scene)
-    matrix = clip_matrix(read_camera(camera, scene), width, height)
+    check_scene(pipeline, chosen, scene)
+    seen_by = read_camera(camera, scene)
+    matrix = clip_matrix(seen_by, width, height)
+    view = pinhole_camera(seen_by, width, height) if chosen.splats else matrix
     sampled = error and counting
     execute = (
         SampledExecutor(error, drawing.seed, pipeline, machine)
         if sampled
         else Executor(counting=counting, picture=drawing.picture)
     )
-    frame = load_pipeline(pipeline)(scene, matrix, width, height, machine.simt, chosen, execute)
+    frame = load_pipeline(pipeline)(scene, view, width, height, machine.simt, chosen, execute)
     origin, asked = origin_of(scene, matrix, drawing.seed), plain(chosen)
     run = Run(
         scene.name, pipeline, machine, width, height, drawing.fidelity, asked, frame, scene.note, error,

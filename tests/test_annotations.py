@@ -22,6 +22,7 @@ FOREIGN = {  # what they take belongs to a library without types
     "models/kernel_digest.py": "numba",
     "models/bits.py": "numba",
     "simulator/stages/borrow.py": "numba",
+    "simulator/stages/kerbl2023/blend_step.py": "numba",
     "simulator/stages/laine2011/exact.py": "numba",
     "simulator/stages/zhang2025/stepped_tile.py": "numba",
     "experiments/harness/cluster.py": "joblib",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba import get_num_threads, set_num_threads
 
+from tests.drawable import scene_for
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
@@ -16,12 +17,12 @@ WIDTH, HEIGHT = 96, 72
 
 @pytest.fixture(scope="module", params=pipeline_names())
 def run(request: pytest.FixtureRequest) -> Run:
-    """A small frame of the teapot by each pipeline, on a machine that can launch them all."""
+    """A small frame by each pipeline, of the teapot or of splats, on a machine that can launch them all."""
     return draw(request.param)
 
 
 def draw(pipeline: str, **options: object) -> Run:
-    return simulate("teapot", pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
+    return simulate(scene_for(pipeline), pipeline, "h200", width=WIDTH, height=HEIGHT, fidelity="bounds", **options)
 
 
 def test_the_picture_is_rows_of_rgb_bytes(run):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.drawable import scene_for
 from tilestamp import load_machine, simulate
 from tilestamp.experiments.command_line import BAD_INPUT, run_command
 from tilestamp.experiments.commands.draw import OF_MESHES, OF_TEXTURES
@@ -87,7 +88,7 @@ def test_what_a_machine_cannot_run_is_said_before_anything_is_executed(pipeline,
             continue
         monkeypatch.setattr("tilestamp.simulator.simulation.load_pipeline", lambda _: pytest.fail("executed"))
         with pytest.raises(UnableError) as refused:
-            simulate("teapot", pipeline, machine, width=64, height=48)
+            simulate(scene_for(pipeline), pipeline, machine, width=64, height=48)
         assert refused.value.instead["machine"] == able[0]
 
 

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.drawable import scene_for
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import FOLDER, altered, list_machines, load_machine
@@ -57,7 +58,7 @@ def test_there_is_a_card_of_each_generation(name, capability):
 @pytest.mark.parametrize("name", CARDS)
 @pytest.mark.parametrize("pipeline", pipeline_names())
 def test_a_card_prices_every_pipeline(name, pipeline):
-    run = simulate("teapot", pipeline, name, width=48, height=36, picture=False)
+    run = simulate(scene_for(pipeline), pipeline, name, width=48, height=36, picture=False)
     assert 0.0 < run.milliseconds < 10.0
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.drawable import scene_for
 from tilestamp import TilestampError, simulate
 from tilestamp.experiments.command_line import BAD_INPUT, run_command
 from tilestamp.simulator.options import Options, descriptions, plain, takes
@@ -139,7 +140,18 @@ def test_every_default_can_be_written_on_the_command_line(name, capsys):
     assert run_command(["list", "options", name, "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     written = [word for option, said in listed.items() for word in ("-O", f"{option}={said['default']}")]
-    scene = ["render", "teapot", "--machine", "h200", "--pipeline", name, "--fidelity", "bounds", *SMALL, "--json"]
+    scene = [
+        "render",
+        scene_for(name),
+        "--machine",
+        "h200",
+        "--pipeline",
+        name,
+        "--fidelity",
+        "bounds",
+        *SMALL,
+        "--json",
+    ]
     assert run_command([*scene, *written]) == 0
     assert json.loads(capsys.readouterr().out)["options"] == plain(options(name))
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.drawable import scene_for
 from tilestamp import TilestampError, altered, load_machine, simulate, variants
 from tilestamp.simulator.pipelines import pipeline_names
 
@@ -85,7 +86,7 @@ def changed(request):
     """A small frame, and its machine with each of its numbers changed by itself, some twice."""
     name, machine = request.param
     try:
-        run = simulate("teapot", name, machine, **SMALL)
+        run = simulate(scene_for(name), name, machine, **SMALL)
     except TilestampError as refused:
         pytest.skip(str(refused))
     return run, [other for key in run.machine.provenance for other in _others(run.machine, key)]

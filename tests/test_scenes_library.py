@@ -84,7 +84,7 @@ def test_a_missing_scene_names_the_variable_where_no_folder_is_set(alone):
 
 def test_the_list_says_that_a_scene_is_missing(alone):
     lines = dict(list_scenes())
-    assert set(lines) == {"teapot", "spot", "bigguy", "killeroo"}
+    assert set(lines) == {"teapot", "spot", "playbot", "bigguy", "killeroo"}
     assert "put killeroo.bpt on the scene search path" in lines["killeroo"]
 
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.drawable import seen
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_names, pipeline_options
-from tilestamp.simulator.scenes import load_scene, read_camera
 from tilestamp.simulator.stage import StageResult
 
 SIZE = 100, 75  # no multiple of a tile
@@ -40,18 +40,16 @@ class Last(Executor):
 def whole(case: int) -> tuple[Any, dict[str, Any], np.ndarray]:
     """Stage, inputs, and the rows of all units."""
     pipeline, machine, options = CASES[case]
-    execute, scene = Last(), load_scene("teapot")
-    matrix, simt = read_camera("default", scene).matrix(*SIZE), load_machine(machine).simt
-    load_pipeline(pipeline)(scene, matrix, *SIZE, simt, pipeline_options(pipeline, options), execute)
+    execute, simt = Last(), load_machine(machine).simt
+    load_pipeline(pipeline)(*seen(pipeline, *SIZE), *SIZE, simt, pipeline_options(pipeline, options), execute)
     return execute.stage, execute.named, execute.stage.run(**execute.named)[1]
 
 
 def test_every_pipeline_with_a_stage_that_runs_in_part_is_here():
     found = set()
     for name in pipeline_names():
-        execute, scene = Last(), load_scene("teapot")
-        matrix, simt = read_camera("default", scene).matrix(*SIZE), load_machine("h200").simt
-        load_pipeline(name)(scene, matrix, *SIZE, simt, pipeline_options(name, {}), execute)
+        execute, simt = Last(), load_machine("h200").simt
+        load_pipeline(name)(*seen(name, *SIZE), *SIZE, simt, pipeline_options(name, {}), execute)
         found |= {name} if execute.stage is not None else set()
     assert found == {pipeline for pipeline, _, _ in CASES}
 

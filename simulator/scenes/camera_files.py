@@ -13,6 +13,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.scenes.camera import Camera, LookAt, ModelToClip
 from tilestamp.simulator.scenes.library import with_views
+from tilestamp.simulator.scenes.pinhole import VIEW_KEY, PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 
@@ -20,7 +21,7 @@ MATRIX_KEY = "model_to_clip"
 CameraSource = Camera | ArrayLike | Mapping[str, Any] | Path | None
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")
 KEYS = ("eye", "target", "position", "forward", "up", *OPTIONAL_KEYS)
-FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...} or {"position", "forward", "up", ...}'
+FORMS = '{"model_to_clip"}, {"eye", "target", "up", ...}, {"position", "forward", "up", ...} or {"view_row_major", ...}'
 
 
 def read_camera(source: CameraSource = None, scene: Scene | Mapping[str, Camera] | None = None) -> Camera:
@@ -30,7 +31,8 @@ def read_camera(source: CameraSource = None, scene: Scene | Mapping[str, Camera]
     ----------
     source : Camera, array-like of (4, 4), mapping, str, Path or None
         A 4x4 matrix is model to clip space, row-major. A mapping has the key ``model_to_clip``, or ``eye, target, up,
-        fov_degrees, near, far``, or ``position, forward, up, fov_degrees, near, far``. A string is a view's name or
+        fov_degrees, near, far``, or ``position, forward, up, fov_degrees, near, far``, or those of a pinhole camera,
+        ``W, H, tan_fovx, tan_fovy, view_row_major, proj_view_row_major``. A string is a view's name or
         ``FILE.json``, ``FILE.json:KEY`` or ``FILE.json:KEY:INDEX``. None is the view ``default``.
     scene : Scene or mapping of str to Camera, optional
         Where views are looked up; a scene without a view ``default`` gets a fitted one.
@@ -104,6 +106,8 @@ def _what_there_is(document: object) -> str:
 def _from_mapping(fields: Mapping[str, Any]) -> Camera:
     if MATRIX_KEY in fields:
         return ModelToClip(fields[MATRIX_KEY])
+    if VIEW_KEY in fields:
+        return PinholeCamera.from_mapping(fields)
     for key in fields.keys() - KEYS:
         near = get_close_matches(str(key), KEYS, 1, 0.75) or [k for k in OPTIONAL_KEYS if k[:3] == str(key)[:3]]
         if near:

@@ -14,13 +14,19 @@ from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_ca
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
 from tilestamp.simulator.scenes.clip_space import read_clip_space
+from tilestamp.simulator.scenes.garden import FILE as GARDEN
+from tilestamp.simulator.scenes.garden import garden, garden_copies
 from tilestamp.simulator.scenes.mesh_file import read_mesh
 from tilestamp.simulator.scenes.notes import Notes
 from tilestamp.simulator.scenes.obj_file import read_obj
 from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
 from tilestamp.simulator.scenes.quad_cage import cage_of
-from tilestamp.simulator.scenes.scene import Patches, Scene, clip_space_scene
-from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files
+from tilestamp.simulator.scenes.scene import Patches, Scene, Splats, clip_space_scene
+from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files, scene_name
+from tilestamp.simulator.scenes.sog import META, is_sog, read_sog
+from tilestamp.simulator.scenes.splat_arrays import has_splat_arrays, read_splat_arrays
+from tilestamp.simulator.scenes.splat_ply import has_splats, read_splat_ply
+from tilestamp.simulator.scenes.splat_view import view_of
 from tilestamp.simulator.scenes.stand_ins import NOT_SHIPPED, cut_like
 from tilestamp.simulator.scenes.subpatches import with_mesh
 from tilestamp.simulator.scenes.textured_mesh import with_texture
@@ -31,6 +37,7 @@ Kind = Literal["patches", "mesh"] | None
 DATA = Path(__file__).parent / "data"
 EMBEDDED = {
     "teapot": ("teapot.bpt", "Newell's teapot, 32 patches (embedded)"),
+    "playbot": ("playbot.sog", "PLAYBOT by Stephane Agullo, CC BY 4.0: 1,873 Gaussian splats (embedded)"),
     "spot": ("spot_control_mesh.obj", "Keenan Crane's cow, a Catmull-Clark cage of 732 patches (embedded)"),
 }
 
@@ -77,8 +84,10 @@ def load_scene(
     if not isinstance(source, str | Path):
         raise TilestampError(f"a scene is a Scene, a name or a file, not {source!r}")
     source = str(source)
+    if garden_copies(source) and (points := find_scene(GARDEN, scene_path)) is not None:
+        return garden(points, garden_copies(source))
     path = _resolve(source, scene_path)
-    name = source if source in EMBEDDED else path.stem
+    name = source if source in EMBEDDED else scene_name(path)
     try:
         return with_views(_read(name, path, kind, texture))
     except TilestampError:
@@ -94,7 +103,11 @@ def list_scenes(scene_path: SearchPath = None) -> list[tuple[str, str]]:
     lines = {name: line for name, (_, line) in EMBEDDED.items()}
     for path in scene_files(scene_path):
         known = path.stem in NOT_SHIPPED and path.suffix == ".bpt"
-        lines.setdefault(path.stem, f"{NOT_SHIPPED[path.stem].line if known else path.suffix[1:] + ' file'} ({path})")
+        if path.name == GARDEN:
+            lines.setdefault("garden1", f"the garden of gsplat's profiler; garden5, garden21: its copies ({path})")
+            continue
+        what = NOT_SHIPPED[path.stem].line if known else f"{path.suffix[1:]} file" if path.suffix else "SOG splats"
+        lines.setdefault(scene_name(path), f"{what} ({path})")
     for name, model in NOT_SHIPPED.items():
         lines.setdefault(name, f"{model.line}: not here; put {name}.bpt on the scene search path (TILESTAMP_SCENES)")
     return list(lines.items())
@@ -136,6 +149,8 @@ def scene_or_stand_in(name: str, scene_path: SearchPath = None) -> Scene:
 def with_views(scene: Scene, up: ArrayLike | None = None) -> Scene:
     """Give a scene the views known for its name, and a fitted ``default`` where they have none."""
     views: dict[str, Camera] = {**VIEWS.get(scene.name, {}), **scene.views}
+    if "default" not in views and scene.splats is not None:
+        views["default"] = view_of(scene.splats)
     if "default" not in views:
         axis = up if up is not None else (0.0, 0.0, 1.0) if scene.name in Z_UP else (0.0, 1.0, 0.0)
         views["default"] = fit_camera(bounds(scene), axis)
@@ -160,7 +175,7 @@ def _resolve(source: str, scene_path: SearchPath) -> Path:
     if source in EMBEDDED:
         return DATA / EMBEDDED[source][0]
     path = Path(source)
-    if is_file(path):
+    if is_file(path) or is_file(path / META):
         return path
     found = find_scene(source, scene_path)
     if found is None:
@@ -175,6 +190,10 @@ def _read(name: str, path: Path, kind: Kind, texture: NDArray[np.uint8] | None =
     if kind not in (None, "patches", "mesh"):
         raise TilestampError(f"kind must be 'patches' or 'mesh', not {kind!r}")
     suffix, notes = path.suffix.lower(), Notes()
+    if (splats := _splats(path, notes)) is not None:
+        if kind is not None or texture is not None:
+            raise TilestampError(f"{path}: has splats, neither patches nor triangles, and no texture fits them")
+        return Scene(name, splats=splats, note="; ".join(notes))
     if suffix == ".obj":
         scene = _from_obj(name, path, kind, notes, texture)
     elif suffix == ".bpt":
@@ -191,6 +210,16 @@ def _read(name: str, path: Path, kind: Kind, texture: NDArray[np.uint8] | None =
         scene = with_texture(scene, texture)
     _note_size(scene, path, notes)
     return replace(scene, note="; ".join(notes))
+
+
+def _splats(path: Path, notes: Notes) -> Splats | None:
+    """Read the splats of a file that has some; None of another."""
+    if is_sog(path):
+        return read_sog(path, notes)
+    suffix = path.suffix.lower()
+    if suffix == ".ply" and has_splats(path):
+        return read_splat_ply(path, notes)
+    return read_splat_arrays(path, notes) if suffix == ".npz" and has_splat_arrays(path) else None
 
 
 def _note_size(scene: Scene, path: Path, notes: Notes) -> None:

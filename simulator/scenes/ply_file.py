@@ -40,7 +40,9 @@ class _Property:
 
 
 @dataclass
-class _Element:
+class Element:
+    """Rows of one kind: the values of each property by its name, of lists one behind another, and their lengths."""
+
     name: str
     rows: int
     properties: list[_Property] = field(default_factory=list)
@@ -50,6 +52,11 @@ class _Element:
 
 def read_ply(path: Path, notes: Notes) -> Mesh:
     """Read the faces (and strips of triangles), colours and normals of a PLY file; raises TilestampError."""
+    return _polygons(path, read_elements(path, notes), notes).mesh(path)
+
+
+def read_elements(path: Path, notes: Notes) -> dict[str, Element]:
+    """Read the elements of a PLY file with the values of their properties, by name; raises TilestampError."""
     raw = read_bytes(path)
     raw = plain_text(raw) if raw[:2] in UTF16_MARKS else raw.removeprefix(UTF8_MARK)
     header = re.compile(rb"\s*ply\s*[\r\n](?:.*?[\r\n])?end_header[ \t]*(?:\r\n|\n|\r|$)", re.DOTALL).match(raw)
@@ -64,19 +71,19 @@ def read_ply(path: Path, notes: Notes) -> Mesh:
             one.kind = np.dtype("f8")
             one.count = one.count and one.kind
     _read_elements(path, body, elements, text=text, notes=notes)
-    return _polygons(path, {element.name: element for element in elements}, notes).mesh(path)
+    return {element.name: element for element in elements}
 
 
-def _header(path: Path, text: str, notes: Notes) -> tuple[bool, list[_Element]]:
+def _header(path: Path, text: str, notes: Notes) -> tuple[bool, list[Element]]:
     """Whether the body is text, and the elements without their values."""
-    order, elements = "", list[_Element]()
+    order, elements = "", list[Element]()
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text.strip()), start=1):
         words = line.split()
         try:
             if words[:1] == ["format"]:
                 order = words[1] if words[1] in ORDERS else ""
             elif words[:1] == ["element"]:
-                elements.append(_Element(words[1], _count(words[2])))
+                elements.append(Element(words[1], _count(words[2])))
             elif words[:2] == ["property", "list"]:
                 kind, count = (
                     np.dtype(TYPES[word]).newbyteorder(ORDERS.get(order, "=")) for word in (words[3], words[2])
@@ -113,10 +120,13 @@ def _numbers(path: Path, raw: bytes, start: int) -> NDArray[np.float64]:
     return found.values
 
 
-def _read_elements(path: Path, data: NDArray[np.uint8], elements: list[_Element], *, text: bool, notes: Notes) -> None:
+def _read_elements(path: Path, data: NDArray[np.uint8], elements: list[Element], *, text: bool, notes: Notes) -> None:
     numbers = data.view(np.float64) if text else None
     at = 0
     for element in elements:
+        if not (text or any(one.count for one in element.properties)):
+            at = _read_table(path, data, at, element)
+            continue
         sizes = np.array([one.kind.itemsize for one in element.properties], np.int64)
         counts = np.array([one.count.itemsize if one.count else 0 for one in element.properties], np.int64)
         least = max(int(np.where(counts > 0, counts, sizes).sum()), 1)
@@ -125,8 +135,7 @@ def _read_elements(path: Path, data: NDArray[np.uint8], elements: list[_Element]
         lengths = np.ones((len(sizes), rows), np.int64) if counts.any() else starts[:0]
         big = any(one.count and one.count.str[0] == ">" for one in element.properties)
         whole, at = _walk(data, numbers, at, sizes, counts, big, starts, lengths)
-        if whole < element.rows and element.properties:
-            raise TilestampError(f"{path}: the file ends after {whole} of {element.rows} rows of {element.name}")
+        _check_rows(path, element, whole)
         for k, one in enumerate(element.properties):
             length = lengths[k] if one.count else np.ones(rows, np.int64)
             element.values[one.name] = _copied(data, starts[k], length, sizes[k]).view(one.kind)
@@ -135,8 +144,26 @@ def _read_elements(path: Path, data: NDArray[np.uint8], elements: list[_Element]
     notes.add_if(len(data) - at > 2, "the file goes on after its last element: what follows is not read")
 
 
-def _polygons(path: Path, elements: dict[str, _Element], notes: Notes) -> Polygons:
-    vertex, face = elements.get("vertex"), elements.get("face", _Element("face", 0))
+def _read_table(path: Path, data: NDArray[np.uint8], at: int, element: Element) -> int:
+    """Read rows of numbers, all of one size, from byte ``at`` on; gives where they end."""
+    row = np.dtype([(f"{k}", one.kind) for k, one in enumerate(element.properties)])
+    rows = min(element.rows, (len(data) - at) // max(row.itemsize, 1))
+    _check_rows(path, element, rows)
+    end = at + rows * row.itemsize
+    table = data[at:end].view(row) if row.itemsize else None
+    for k, one in enumerate(element.properties):
+        element.values[one.name] = table[f"{k}"].copy() if table is not None else np.empty(0, one.kind)
+    return end
+
+
+def _check_rows(path: Path, element: Element, whole: int) -> None:
+    """Refuse a file that ends too early."""
+    if whole < element.rows and element.properties:
+        raise TilestampError(f"{path}: the file ends after {whole} of {element.rows} rows of {element.name}")
+
+
+def _polygons(path: Path, elements: dict[str, Element], notes: Notes) -> Polygons:
+    vertex, face = elements.get("vertex"), elements.get("face", Element("face", 0))
     if vertex is None or not all(axis in vertex.values for axis in XYZ):
         raise TilestampError(f"{path}: has no vertices with x, y and z")
     columns = _columns(vertex, XYZ)
@@ -161,11 +188,11 @@ def _polygons(path: Path, elements: dict[str, _Element], notes: Notes) -> Polygo
     return Polygons(columns, corners, sizes, colors, None if colors is not None else face_colors, normals)
 
 
-def _columns(element: _Element, names: tuple[str, ...]) -> NDArray[np.float64]:
+def _columns(element: Element, names: tuple[str, ...]) -> NDArray[np.float64]:
     return np.stack([element.values[name].astype(np.float64) for name in names], axis=1)
 
 
-def _colors(element: _Element, notes: Notes) -> NDArray[np.float64] | None:
+def _colors(element: Element, notes: Notes) -> NDArray[np.float64] | None:
     """RGBA in [0, 1], (rows, 4): integers by their type's largest value, fractions as they are."""
     if not all(name in element.values and name not in element.lengths for name in COLOR[:3]):
         return None
@@ -180,7 +207,7 @@ def _colors(element: _Element, notes: Notes) -> NDArray[np.float64] | None:
     return colors / 255.0
 
 
-def _strips(element: _Element | None) -> Iterator[NDArray[np.int64]]:
+def _strips(element: Element | None) -> Iterator[NDArray[np.int64]]:
     """Corners of the triangles of strips, which -1 ends."""
     for name in CORNERS if element is not None else ():
         if element is not None and name in element.lengths:

@@ -1,4 +1,4 @@
-"""A scene: patches or triangles, and the cameras that they are known by."""
+"""A scene: patches, triangles or splats, and the cameras that they are known by."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,18 +9,20 @@ from numpy.typing import ArrayLike
 from tilestamp.simulator.scenes.camera import Camera, ModelToClip
 from tilestamp.simulator.scenes.clip_space import clip_space_mesh
 from tilestamp.simulator.scenes.geometry import Mesh, Patches
+from tilestamp.simulator.scenes.splats import Splats, make_splats
 from tilestamp.simulator.scenes.sweep import sweep_mesh
 
-__all__ = ["Mesh", "Patches", "Scene", "clip_space_scene"]
+__all__ = ["Mesh", "Patches", "Scene", "Splats", "clip_space_scene"]
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What a pipeline draws: ``patches`` or a ``mesh`` (or both), and named ``views``."""
+    """What a pipeline draws: ``patches`` or a ``mesh`` (or both), or ``splats``; and named ``views``."""
 
     name: str
     patches: Patches | None = None
     mesh: Mesh | None = None
+    splats: Splats | None = None
     views: Mapping[str, Camera] = field(default_factory=dict)
     note: str = ""  # what its reader skipped, guessed or could not represent; or that it is a stand-in
 
@@ -31,6 +33,31 @@ class Scene:
         Raises TilestampError where positions are not finite, triangles name vertices that do not exist, or are none.
         """
         return clip_space_scene(clip_space_mesh(positions, triangles, name), name)
+
+    @classmethod
+    def from_splats(
+        cls,
+        means: ArrayLike,
+        scales: ArrayLike,
+        rotations: ArrayLike,
+        opacities: ArrayLike,
+        colours: ArrayLike,
+        name: str = "splats",
+    ) -> "Scene":
+        """Make a scene of 3D Gaussians, rounded to float32 and otherwise taken as they are.
+
+        Parameters
+        ----------
+        means, scales : array-like, (N, 3)
+            Centres, and standard deviations along the own axes.
+        rotations : array-like, (N, 4)
+            Quaternions w x y z, which are not normalized.
+        opacities : array-like, (N,)
+        colours : array-like, (N, 3)
+
+        Raises TilestampError where they do not fit together, are no numbers, or are none.
+        """
+        return cls(name, splats=make_splats(means, scales, rotations, opacities, colours))
 
     @classmethod
     def sweep(cls, area: float, width: int = 1024, height: int = 768, seed: int = 0) -> "Scene":

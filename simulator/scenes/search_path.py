@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tilestamp.models.errors import MissingInputError
 from tilestamp.models.nearest_name import did_you_mean
+from tilestamp.models.paths import is_file
 from tilestamp.models.used import note
 
 SCENES_VARIABLE = "TILESTAMP_SCENES"  # folders, joined as in PATH
@@ -16,7 +17,9 @@ MISSING = "missing"
 DIGITS = 16  # hexadecimal, of a digest
 LEVELS = 2  # of sub-folders that are looked into
 # Where files of one stem differ in kind, the first of these wins: the paper's patches before a cage before triangles.
-SUFFIXES = (".bpt", ".obj", ".ply", ".glb", ".gltf", ".off", ".stl", ".npz")
+SUFFIXES = (".bpt", ".obj", ".ply", ".glb", ".gltf", ".off", ".stl", ".npz", ".sog")
+FOLDER_MARK = "meta.json"  # of a folder that is a scene
+COMPRESSED = ".compressed"  # before .ply
 
 SearchPath = str | Path | Iterable[str | Path] | None
 
@@ -38,12 +41,22 @@ def scene_files(scene_path: SearchPath = None) -> list[Path]:
         files = [path for level in range(LEVELS + 1) for path in sorted(folder.glob("*/" * level + "*"))]
         for suffix in SUFFIXES:
             found.update(dict.fromkeys(path for path in files if path.suffix.lower() == suffix and path.is_file()))
+        found.update(dict.fromkeys(path for path in files if is_file(path / FOLDER_MARK)))
     return list(found)
+
+
+def scene_name(path: Path) -> str:
+    """Name of the scene in a file: its stem; of a folder of levels of detail the folder above, too (``playbot/2``)."""
+    if path.name == FOLDER_MARK:
+        path = path.parent
+    if not path.suffix:
+        return f"{path.parent.name}/{path.name}" if path.name.isdecimal() else path.name
+    return path.stem.removesuffix(COMPRESSED)
 
 
 def find_scene(name: str, scene_path: SearchPath = None) -> Path | None:
     """Find a file by its stem or its whole name on the search path, or None; either is noted for manifests."""
-    path = next((path for path in scene_files(scene_path) if name in (path.stem, path.name)), None)
+    path = next((path for path in scene_files(scene_path) if name in (path.stem, path.name, scene_name(path))), None)
     note(FILES, name, file_digest(path))
     return path
 
@@ -58,6 +71,7 @@ def file_digest(path: Path | None) -> str:
 
 @cache
 def _digest(path: Path, _size: int, _modified: int) -> str:
+    path = path / FOLDER_MARK if path.is_dir() else path
     with path.open("rb") as file:
         return digest_of_file(file, "sha256").hexdigest()[:DIGITS]
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.drawable import scene_for
 from tests.ledger.scenes import GENERATED
 from tilestamp import Run, TilestampError, simulate
 from tilestamp.models.events import MachineEvent
@@ -61,6 +62,12 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
     ),
     "binned": (("h200", {"original_faults": True, "texture_layout": "rows", "texture_levels": 4}),),
     "hardware": (("h200", {"guard_band": False}),),
+    "splat": (
+        *(("h200", {"tile": tile}) for tile in (4, 8, "16x8", 32)),  # each priced by itself
+        ("h200", {"bound": "box"}),
+        ("h200", {"bound": "ellipse", "tile": 8}),
+        ("h200", {"threads": 64}),
+    ),
 }
 
 
@@ -126,6 +133,8 @@ GENERATED_FRAMES = (
         for texels in ("bilinear", "nearest")
     ),
     Frame("binned", SOUP, "ga104", {"fragment_depth": "stepped"}),
+    Frame("splat", "odd splats", "h200", {}),
+    Frame("splat", "odd splats", "h200", {"bound": "ellipse", "tile": 8}),
     Frame("binned", SOUP, "h200", {"order": "oit", "texture_filter": "bilinear", "cull_backfaces": False}),
     Frame("binned", SOUP, "h200", {}),  # magnified textures
     *(Frame("binned", SOUP, machine, {"derivatives": "planes"}) for machine in ("ga104", "h200")),
@@ -136,9 +145,9 @@ GENERATED_FRAMES = (
 
 def frames(pipeline: str) -> list[Frame]:
     """Frames of a pipeline: one on a machine of each family, its variants, and those of generated scenes."""
-    scenes = ("teapot", "spot") if pipeline in TEXTURED else ("teapot",)
+    scenes = ("teapot", "spot") if pipeline in TEXTURED else (scene_for(pipeline),)
     made = [Frame(pipeline, scene, machine, {}) for scene in scenes for machine in FAMILIES]
-    made += [Frame(pipeline, "teapot", machine, options) for machine, options in VARIANTS.get(pipeline, ())]
+    made += [Frame(pipeline, scene_for(pipeline), machine, options) for machine, options in VARIANTS.get(pipeline, ())]
     return made + [frame for frame in GENERATED_FRAMES if frame.pipeline == pipeline]
 
 

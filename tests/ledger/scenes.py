@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.geometry import Mesh, Patches
+from tilestamp.simulator.scenes.pinhole import PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.splat_view import perspective
+from tilestamp.simulator.scenes.splats import make_splats
 
 IN_THE_MIDDLE = LookAt((0.0, 0.0, 1.5), (0.0, 0.0, 0.0), fov_degrees=60.0, near=0.2, far=3.0)
 
@@ -56,6 +59,23 @@ def _crowd(rng: np.random.Generator, size: float, spread: float, behind: float) 
     return np.concatenate([corners, depth, w], axis=2)
 
 
+def odd_splats(count: int = 200) -> Scene:
+    """Splats in front of a camera that looks along z: random ones, some too near, beside the view or too thin to see.
+
+    Eight are slivers of determinants that round to zero or to anything: their scales hide what a pixel adds.
+    """
+    rng = np.random.default_rng(5)
+    means = rng.uniform((-2.0, -1.5, 0.0), (2.0, 1.5, 4.0), (count, 3))
+    scales, rotations = 2.0 ** rng.uniform(-7.0, -2.0, (count, 3)), rng.normal(size=(count, 4))
+    rotations /= np.linalg.norm(rotations, axis=1, keepdims=True)
+    opacities = rng.uniform(0.0, 1.0, count)
+    means[:8], scales[:8], rotations[:8] = (0.0, 0.0, 1.5), 0.0, (0.5, 0.0, 0.0, 0.5)
+    scales[:8, 0], opacities[:8] = 2.0**14 * np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7]), 0.1
+    opacities[8:16], opacities[16:80] = 1e-3, 1.0
+    splats = make_splats(means, scales, rotations, opacities, rng.uniform(size=(count, 3)))
+    return Scene("odd splats", splats=splats, views={"default": PinholeCamera(perspective(np.eye(4), 1.0, 0.75))})
+
+
 def cut_into_six() -> Scene:
     """512 triangles in clip space that the frustum cuts into five or six each: more than a ring of bin raster holds."""
     corners = np.array([(2.4, -1.9, -0.2, 1.0), (-0.4, 2.3, -1.6, 1.0), (-1.1, -0.8, 1.0, 1.0)])
@@ -87,4 +107,5 @@ def patches_at_the_eye() -> Scene:
     return Scene("patches at the eye", Patches(points), views={"default": IN_THE_MIDDLE})
 
 
-GENERATED = {scene.name: scene for scene in (textured_soup(), crowds(), cut_into_six(), patches_at_the_eye())}
+MADE = (textured_soup(), crowds(), cut_into_six(), patches_at_the_eye(), odd_splats())
+GENERATED = {scene.name: scene for scene in MADE}

@@ -4,6 +4,7 @@ Each function is plain Python first, so that the kernels also run interpreted; c
 instruction through an overload.
 """
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,28 @@ def _llvm_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
 def _fma(a, b, c):  # type: ignore[no-untyped-def]
     if a == b == c == types.float32:
         return lambda a, b, c: _llvm_fma(a, b, c)  # noqa: PLW0108 - numba needs a function
+    return None
+
+
+def fma64(a: Any, b: Any, c: Any) -> Any:
+    """Multiply and add with one rounding to float64."""
+    if not np.isfinite([a, b, c]).all():
+        return a * b + c
+    return float(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _llvm_fma64(_context: Any, a: Any, b: Any, c: Any) -> Any:
+    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return builder.fma(*args)
+
+    return types.float64(a, b, c), codegen
+
+
+@overload(fma64, inline="never")
+def _fma64(a, b, c):  # type: ignore[no-untyped-def]
+    if a == b == c == types.float64:
+        return lambda a, b, c: _llvm_fma64(a, b, c)  # noqa: PLW0108 - numba needs a function
     return None
 
 

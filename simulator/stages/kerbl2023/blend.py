@@ -1,0 +1,271 @@
+"""Blend: one block a tile walks along its list from near to far; a thread has a pixel, or several.
+
+In rounds, as many entries as the block has threads are loaded to shared memory; then each thread evaluates each at its
+pixel, blends it where alpha is 1/255 or more, and is done where the transmittance would fall below 0.0001. The block
+leaves before a round in which all are done. Colours are not in shared memory: each blend reads them by the index.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.kerbl2023 import blend_walk as group
+from tilestamp.simulator.stages.kerbl2023.blend_block import (
+    CONIC_BYTES,
+    INDEX_BYTES,
+    POSITION_BYTES,
+    Block,
+    Room,
+    block_of,
+    count_rounds,
+    gather_sectors,
+)
+from tilestamp.simulator.stages.kerbl2023.blend_step import (
+    ENTRY,
+    ENTRY_RED,
+    GX,
+    LANES,
+    LAST,
+    RED,
+    ROWS,
+    TRANSMITTANCE,
+    A,
+    X,
+    Y,
+)
+from tilestamp.simulator.stages.kerbl2023.blend_walk import BOX, PER_ROUND, TOTALS, reach_box, walk
+from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
+from tilestamp.simulator.stages.kerbl2023.project import Projected
+from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
+from tilestamp.simulator.stages.laine2011.exact import fma
+from tilestamp.simulator.work import Work
+
+SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
+COLOURS, PLANES = 3, 5  # floats that a blend reads; words that a pixel stores
+_PART = 8  # tiles, at least
+_E = BlendEvent
+
+
+class Pixels(NamedTuple):
+    """What the pixels show.
+
+    Parameters
+    ----------
+    colours : ndarray, (H, W, 3), float32
+        Blended over the background; neither clipped nor rounded.
+    transmittance : ndarray, (H, W), float32
+        What is left of the background.
+    reached : ndarray, (H, W), uint32
+        Place of the last entry that was blended in the list of its tile, from 1; 0 where there is none.
+    """
+
+    colours: NDArray[np.float32]
+    transmittance: NDArray[np.float32]
+    reached: NDArray[np.uint32]
+
+
+@kernel(lent=True)
+def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, room: Room) -> None:
+    """Gather the entries of a tile."""
+    for k in range(count):
+        i = listed[first + k]
+        entry = room.entries[k]
+        entry[GX], entry[GX + 1] = out.positions[i, 0], out.positions[i, 1]
+        for j in range(4):
+            entry[A + j] = out.conics[i, j]
+        for j in range(COLOURS):
+            entry[ENTRY_RED + j] = colours[i, j]
+        reach_box(entry, room.boxes[k])
+
+
+@kernel(lent=True)
+def _place(tile: int, tiles: Tiles, block: Block, slot: int, warp: int, room: Room) -> Any:
+    """Set up the pixels of a warp: coordinates, who is on the screen; gives the rectangle around them."""
+    left = tile % tiles.columns * tiles.tile_x
+    top = tile // tiles.columns * tiles.tile_y
+    first = slot * block.threads + warp * block.warp
+    end = min(first + block.warp, (slot + 1) * block.threads)
+    room.state[:] = 0
+    room.alive[:] = 0
+    for lane in range(end - first):
+        x, y = left + (first + lane) % tiles.tile_x, top + (first + lane) // tiles.tile_x
+        room.state[X, lane], room.state[Y, lane] = x, y
+        room.state[TRANSMITTANCE, lane] = 1
+        if x < tiles.width and y < tiles.height:
+            room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
+    columns = min(end - first, tiles.tile_x)
+    x = left + first % tiles.tile_x
+    return x, x + columns - 1, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
+
+
+@kernel(lent=True)
+def _store(
+    tile: int, tiles: Tiles, block: Block, slot: int, warp: int, background: Any, room: Room, pixels: Pixels, row: Any
+) -> None:
+    """Store the pixels of a warp; count the sectors, of each row of pixels by itself."""
+    left = tile % tiles.columns * tiles.tile_x
+    top = tile // tiles.columns * tiles.tile_y
+    first = slot * block.threads + warp * block.warp
+    end = min(first + block.warp, (slot + 1) * block.threads)
+    lasts = room.state.view(np.int32)
+    stored = 0
+    for p in range(first, end):
+        x, y, lane = left + p % tiles.tile_x, top + p // tiles.tile_x, p - first
+        if x >= tiles.width or y >= tiles.height:
+            continue
+        transmittance = room.state[TRANSMITTANCE, lane]
+        for k in range(COLOURS):
+            pixels.colours[y, x, k] = fma(background[k], transmittance, room.state[RED + k, lane])
+        pixels.transmittance[y, x] = transmittance
+        pixels.reached[y, x] = lasts[LAST, lane]
+        stored += 1
+        if row is not None:
+            for plane in range(PLANES):
+                word = max(plane - 2, 0) * tiles.width * tiles.height + y * tiles.width + x
+                begins = p == first or p % tiles.tile_x == 0 or word * 4 % block.segment == 0
+                row[_E.STORE_TRANSACTIONS] += begins
+    if row is not None:
+        row[_E.PIXELS] += stored
+        row[_E.PIXEL_WARPS] += stored > 0
+
+
+@kernel(lent=True)
+def _tile(
+    tile: int, tiles: Tiles, block: Block, count: int, background: Any, room: Room, pixels: Pixels, row: Any
+) -> None:  # fmt: skip
+    """Blend the list of one tile."""
+    rounds = (count + block.threads - 1) // block.threads
+    room.rounds[:, :, :rounds] = 0
+    room.totals[:] = 0
+    room.marks[:count] = 0
+    lasts = room.state.view(np.int32)
+    for warp in range(block.warps):
+        bit = np.uint32(1) << np.uint32(warp)
+        for slot in range(block.pixels):
+            rectangle = _place(tile, tiles, block, slot, warp, room)
+            totals = room.totals[warp, slot]
+            walk(
+                room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
+                room.rounds[warp, slot], room.marks, bit, totals,
+            )  # fmt: skip
+            _store(tile, tiles, block, slot, warp, background, room, pixels, row)
+            if row is not None:
+                row[_E.STEPS] += totals[group.TRIPS]
+                row[_E.EVALUATIONS] += totals[group.EVALUATIONS]
+                row[_E.EXP_STEPS] += totals[group.EXP_STEPS]
+                row[_E.EXP_LANES] += totals[group.EXP_LANES]
+                row[_E.BLEND_STEPS] += totals[group.BLEND_STEPS]
+                row[_E.BLENDED] += totals[group.BLENDED]
+                row[_E.SKIPPED_POWER] += totals[group.SKIPPED_POWER]
+                row[_E.STOPPED] += totals[group.STOPPED]
+
+
+@kernel
+def _blend(
+    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, tiles: Tiles,
+    block: Block, background: Any, pixels: Pixels, table: Any,
+) -> None:  # fmt: skip
+    """Blend a part of the tiles; row i of the table is that of the i-th of them."""
+    begin, end = len(drawn) * part // parts, len(drawn) * (part + 1) // parts
+    longest = 1
+    for i in range(begin, end):
+        longest = max(longest, starts[drawn[i] + 1] - starts[drawn[i]])
+    lanes = block.parts * LANES
+    room = Room(
+        np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int64), np.empty((ROWS, lanes), np.float32),
+        np.empty(block.parts, np.uint32),
+        np.empty((block.warps, block.pixels, longest // block.threads + 1, PER_ROUND), np.int64),
+        np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint32),
+        np.zeros((2, len(out.radii) * CONIC_BYTES // block.segment + 1 if table is not None else 1), np.int64),
+    )  # fmt: skip
+    for i in range(begin, end):
+        tile = drawn[i]
+        first, count = starts[tile], starts[tile + 1] - starts[tile]
+        row = None if table is None else table[i]
+        _load(first, count, listed, out, colours, room)
+        _tile(tile, tiles, block, count, background, room, pixels, row)
+        if row is not None:
+            row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
+            count_rounds(count, block, room, row)
+            row[_E.SKIPPED_ALPHA] = row[_E.EXP_LANES] - row[_E.BLENDED] - row[_E.STOPPED]
+            row[_E.IDLE_LANES] = row[_E.STEPS] * block.warp - row[_E.EVALUATIONS]
+            for size in range(0, row[_E.ENTRIES], block.threads):
+                row[_E.GATHER_WARPS] += (min(block.threads, row[_E.ENTRIES] - size) + block.warp - 1) // block.warp
+            gathers = gather_sectors(first, row[_E.ENTRIES], listed, block, room)
+            row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + block.warps
+            row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * block.segment
+            row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * block.segment
+
+
+def blend(
+    starts: NDArray[np.int64],
+    listed: NDArray[np.uint32],
+    projected: Projected,
+    colours: NDArray[np.float32],
+    tiles: Tiles,
+    simt: Simt,
+    *,
+    threads: int,
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    counting: bool = True,
+) -> StageResult[Pixels]:
+    """Blend the lists of all tiles.
+
+    Parameters
+    ----------
+    starts : ndarray, (tiles + 1,), int64
+        Tile i has the entries ``listed[starts[i] : starts[i + 1]]``.
+    listed : ndarray, (P,), uint32
+        Gaussians, from near to far in each tile.
+    projected : Projected
+    colours : ndarray, (N, 3), float32
+    tiles : Tiles
+    simt : Simt
+    threads : int
+        Of a block: a divisor of the pixels of a tile.
+    background : tuple of float
+    counting : bool
+
+    Returns
+    -------
+    outputs : Pixels
+    works : one, a row a tile
+    """
+    shape = (tiles.height, tiles.width)
+    pixels = Pixels(np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32))
+    block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
+    table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
+    inputs = (starts, listed, projected, colours, tiles, block, over, pixels, table)
+    for_parts(_blend, parts_of(tiles.total, _PART), np.arange(tiles.total), *inputs)
+    return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
+
+
+def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int = 0) -> Work:
+    """Work of the kernel, from the rows of all tiles."""
+    total = dict(zip(_E, table.sum(axis=0).tolist(), strict=True))
+    entries, pixels, gathers = total[_E.ENTRIES], total[_E.PIXELS], COLOURS * total[_E.BLEND_TRIPS]
+    used = min(count, entries)
+    several = f" threads {threads}" if threads < tiles.pixels else ""
+    return Work(
+        stage="blend",
+        kernel="blend",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=threads,
+        shared_bytes=SHARED_BYTES * threads,
+        variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}",
+        streams=(
+            Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
+            Stream("positions", "load", 32 * entries, POSITION_BYTES * used),
+            Stream("conics", "load", 32 * entries, CONIC_BYTES * used),
+            Stream("colours", "load", 32 * gathers, 4 * COLOURS * used),
+            Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * pixels),
+        ),
+    )

@@ -1,0 +1,87 @@
+"""Ranges: one thread a pair finds where the list of a tile begins and ends in the sorted pairs."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.coalescing import SECTOR_BYTES
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.kerbl2023.duplicate import KEY_BYTES
+from tilestamp.simulator.stages.kerbl2023.events import RangesEvent
+from tilestamp.simulator.work import Work
+
+BLOCK = 256  # threads
+DEPTH_BITS = 32
+_E = RangesEvent
+
+
+@kernel
+def _ranges(keys: Any, starts: Any, warp: int, table: Any) -> None:
+    """Fill ``starts``; a thread whose pair is of another tile than the one before stores both ends."""
+    tile = last_warp = 0
+    before = np.int64(-1)
+    for i in range(len(keys)):
+        here = np.int64(keys[i] >> np.uint64(DEPTH_BITS))
+        while tile <= here:
+            starts[tile] = i
+            tile += 1
+        if table is not None and here != before:
+            row = table[i // BLOCK]
+            row[_E.LISTED_TILES] += 1
+            row[_E.EDGE_WARPS] += i // warp + 1 != last_warp
+            last_warp = i // warp + 1
+            row[_E.STORE_TRANSACTIONS] += 2 if i else 1
+        before = here
+    starts[tile:] = len(keys)
+
+
+def ranges(
+    keys: NDArray[np.uint64], tiles: int, simt: Simt, *, counting: bool = True
+) -> StageResult[NDArray[np.int64]]:
+    """Find where the list of each tile begins.
+
+    Parameters
+    ----------
+    keys : ndarray, (P,), uint64
+        Sorted.
+    tiles : int
+    simt : Simt
+    counting : bool
+
+    Returns
+    -------
+    outputs : ndarray, (tiles + 1,), int64
+        Tile i has the pairs from ``outputs[i]`` on, and those before ``outputs[i + 1]``.
+    works : one, a row a block; none where there are no pairs
+    """
+    starts = np.zeros(tiles + 1, np.int64)
+    blocks = -(-len(keys) // BLOCK)
+    table = np.zeros((blocks, len(_E)), np.int64) if counting and blocks else None
+    _ranges(keys, starts, simt.warp, table)
+    return StageResult(starts, () if table is None else (_work(table, len(keys), tiles, simt),))
+
+
+def _work(table: NDArray[np.int64], pairs: int, tiles: int, simt: Simt) -> Work:
+    lanes = np.full(len(table), BLOCK, np.int64)
+    lanes[-1] = pairs - (len(table) - 1) * BLOCK
+    table[:, _E.WARPS], table[:, _E.PAIRS], table[:, _E.BLOCKS] = -(-lanes // simt.warp), lanes, 1
+    one = -(-lanes * KEY_BYTES // SECTOR_BYTES)
+    table[:, _E.LOAD_TRANSACTIONS] = 2 * one + table[:, _E.WARPS]  # the key, and that of the thread before
+    table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
+    table[:, _E.STORE_BYTES] = table[:, _E.STORE_TRANSACTIONS] * SECTOR_BYTES
+    return Work(
+        stage="ranges",
+        kernel="ranges",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        streams=(
+            Stream("keys", "load", 2 * KEY_BYTES * pairs, KEY_BYTES * pairs),
+            Stream("ranges", "store", int(table[:, _E.STORE_BYTES].sum()), 8 * tiles),
+        ),
+    )

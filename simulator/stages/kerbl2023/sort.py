@@ -1,0 +1,205 @@
+"""Sort: pairs by their keys, a radix sort by digits of 8 bits, lowest first (Adinets & Merrill 2022, as in CUB).
+
+One kernel counts the digits of all passes, one sums them up; then each pass reads the pairs once, in blocks of 5,760,
+and writes each to its place: the pairs of a block that have a digit in common lie one behind another, a run. Pairs of
+equal keys keep their order. Only the bits that keys can have are sorted: 32 of the depth and those of the tile count.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tilestamp.models.coalescing import SECTOR_BYTES
+from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.kerbl2023.duplicate import KEY_BYTES, VALUE_BYTES, Pairs
+from tilestamp.simulator.stages.kerbl2023.events import SortEvent
+from tilestamp.simulator.work import Work
+
+DIGIT_BITS = 8
+RADIX = 1 << DIGIT_BITS
+DEPTH_BITS = 32
+BLOCK = 384  # threads of a pass
+ITEMS = 15  # pairs a thread
+SHARED_BYTES = 47104
+HISTOGRAM_BLOCK, HISTOGRAM_SHARED_BYTES, HISTOGRAM_BLOCKS_PER_SM = 128, 8192, 9
+TILE = BLOCK * ITEMS  # pairs a block
+_E = SortEvent
+
+
+def key_bits(tiles: int) -> int:
+    """Bits of a key that are sorted: 32 of depth, and as many as the number of tiles has."""
+    return DEPTH_BITS + tiles.bit_length()
+
+
+@kernel
+def _histogram(part: int, parts: int, keys: Any, shift: int, counts: Any) -> None:
+    """Digits of each block of a part of the blocks."""
+    blocks = len(counts)
+    for block in range(blocks * part // parts, blocks * (part + 1) // parts):
+        row = counts[block]
+        for i in range(block * TILE, min((block + 1) * TILE, len(keys))):
+            row[(keys[i] >> np.uint64(shift)) & np.uint64(RADIX - 1)] += 1
+
+
+@kernel
+def _starts(counts: Any, starts: Any) -> None:
+    """Where the run of each block and digit begins."""
+    at = 0
+    total = np.zeros(RADIX, np.int64)
+    for block in range(len(counts)):
+        for digit in range(RADIX):
+            total[digit] += counts[block, digit]
+    for digit in range(RADIX):
+        count = total[digit]
+        total[digit] = at
+        at += count
+    for block in range(len(counts)):
+        for digit in range(RADIX):
+            starts[block, digit] = total[digit]
+            total[digit] += counts[block, digit]
+
+
+@kernel
+def _scatter(
+    part: int, parts: int, keys: Any, values: Any, shift: int, starts: Any, new_keys: Any, new_values: Any
+) -> None:
+    """Write the pairs of a part of the blocks to their places."""
+    blocks = len(starts)
+    for block in range(blocks * part // parts, blocks * (part + 1) // parts):
+        row = starts[block]
+        for i in range(block * TILE, min((block + 1) * TILE, len(keys))):
+            key = keys[i]
+            digit = (key >> np.uint64(shift)) & np.uint64(RADIX - 1)
+            at = row[digit]
+            row[digit] = at + 1
+            new_keys[at] = key
+            new_values[at] = values[i]
+
+
+@kernel
+def _count_runs(counts: Any, starts: Any, pairs: int, warp: int, table: Any) -> None:
+    """Events of the blocks of a pass: loads of whole blocks, stores of runs."""
+    for block in range(len(counts)):
+        row = table[block]
+        size = min(TILE, pairs - block * TILE)
+        row[_E.WARPS] = (BLOCK + warp - 1) // warp
+        row[_E.PAIRS] = size
+        row[_E.BLOCKS] = row[_E.PASSES] = 1
+        for width in (KEY_BYTES, VALUE_BYTES):
+            row[_E.LOAD_TRANSACTIONS] += (size * width + SECTOR_BYTES - 1) // SECTOR_BYTES
+        for digit in range(RADIX):
+            count = counts[block, digit]
+            if count:
+                row[_E.DIGITS] += 1
+                for width in (KEY_BYTES, VALUE_BYTES):
+                    first = starts[block, digit] * width // SECTOR_BYTES
+                    last = ((starts[block, digit] + count) * width - 1) // SECTOR_BYTES
+                    row[_E.STORE_TRANSACTIONS] += last - first + 1
+        row[_E.ALIKE], row[_E.MIXED] = row[_E.DIGITS] == 1, row[_E.DIGITS] > 1
+        row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * SECTOR_BYTES
+        row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * SECTOR_BYTES
+
+
+def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> StageResult[Pairs]:
+    """Sort pairs.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        Overwritten.
+    bits : int
+        Of the keys, the lowest so many are sorted: ``key_bits``.
+    simt : Simt
+    counting : bool
+
+    Returns
+    -------
+    outputs : Pairs
+    works : the histogram, the exclusive sum, and one for each pass
+    """
+    count = len(pairs.keys)
+    blocks = -(-count // TILE)
+    passes = -(-bits // DIGIT_BITS)
+    other = Pairs(np.empty_like(pairs.keys), np.empty_like(pairs.values))
+    works = [_histogram_work(count, passes, simt), _sum_work(passes, simt)] if counting and count else []
+    counts, starts = np.empty((2, blocks, RADIX), np.int64)
+    parts = parts_of(blocks)
+    for k in range(passes):
+        shift = k * DIGIT_BITS
+        counts[:] = 0
+        for_parts(_histogram, parts, pairs.keys, shift, counts)
+        _starts(counts, starts)
+        if counting and count:
+            works.append(_pass_work(k, counts, starts, count, simt))
+        for_parts(_scatter, parts, *pairs, shift, starts, *other)
+        pairs, other = other, pairs
+    return StageResult(pairs, tuple(works))
+
+
+def _streams(count: int, *, back: bool) -> tuple[Stream, ...]:
+    """What a pass reads and writes: keys and values, from one pair of buffers to the other."""
+    names = ("", "2") if not back else ("2", "")
+    sizes = (("keys", KEY_BYTES), ("values", VALUE_BYTES))
+    loads = [Stream(name + names[0], "load", size * count, size * count) for name, size in sizes]
+    return (*loads, *(Stream(name + names[1], "store", size * count, size * count) for name, size in sizes))
+
+
+def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pairs: int, simt: Simt) -> Work:
+    table = np.zeros((len(counts), len(_E)), np.int64)
+    _count_runs(counts, starts, pairs, simt.warp, table)
+    table[0, _E.DIGITS_USED] = np.count_nonzero(counts.any(axis=0))
+    return Work(
+        stage="sort",
+        kernel="sort_onesweep",
+        events=_E,
+        table=table,
+        grid=len(table),
+        block=BLOCK,
+        shared_bytes=SHARED_BYTES,
+        streams=_streams(pairs, back=k % 2 == 1),
+        variant=f"pass {k}",
+    )
+
+
+def _histogram_work(pairs: int, passes: int, simt: Simt) -> Work:
+    """Persistent blocks, a fixed number an SM, that each count the digits of a share of the keys."""
+    blocks = HISTOGRAM_BLOCKS_PER_SM * simt.sms
+    table = np.zeros((blocks, len(_E)), np.int64)
+    table[:, _E.WARPS] = -(-HISTOGRAM_BLOCK // simt.warp)
+    table[:, _E.PAIRS] = np.diff(np.arange(blocks + 1) * pairs // blocks)
+    table[:, _E.BLOCKS], table[:, _E.PASSES] = 1, passes
+    table[:, _E.LOAD_TRANSACTIONS] = -(-table[:, _E.PAIRS] * KEY_BYTES // SECTOR_BYTES)
+    table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
+    return Work(
+        stage="sort",
+        kernel="sort_histogram",
+        events=_E,
+        table=table,
+        grid=blocks,
+        block=HISTOGRAM_BLOCK,
+        shared_bytes=HISTOGRAM_SHARED_BYTES,
+        streams=(Stream("keys", "load", KEY_BYTES * pairs, KEY_BYTES * pairs),),
+    )
+
+
+def _sum_work(passes: int, simt: Simt) -> Work:
+    """A block a pass, a thread a digit."""
+    table = np.zeros((passes, len(_E)), np.int64)
+    table[:, _E.WARPS], table[:, _E.BLOCKS], table[:, _E.PASSES] = -(-RADIX // simt.warp), 1, 1
+    moved = RADIX * 4
+    table[:, [_E.LOAD_TRANSACTIONS, _E.STORE_TRANSACTIONS]] = moved // SECTOR_BYTES
+    table[:, [_E.LOAD_BYTES, _E.STORE_BYTES]] = moved
+    return Work(
+        stage="sort",
+        kernel="sort_exclusive_sum",
+        events=_E,
+        table=table,
+        grid=passes,
+        block=RADIX,
+        streams=(Stream("digits", "load", passes * moved, passes * moved),),
+    )
