@@ -1,15 +1,10 @@
-"""The executor of a pipeline: it runs the stages, every unit of each, and keeps what they did.
-
-A pipeline hands each stage and its inputs to its executor, ``execute(stage, *inputs)``; one of which only the picture
-and the counts are wanted, and no later stage the outputs, by ``execute.last``: of such a stage another executor
-(``simulator.sampling.executor``) may run part of the units.
-"""
+"""The executor of a pipeline: it runs the stages, ``execute(stage, *inputs)``, and keeps what they did."""
 
 from collections.abc import Callable
 from inspect import signature
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from tilestamp.simulator.stage import Divisible, StageResult
+from tilestamp.simulator.stage import StageResult
 
 if TYPE_CHECKING:
     from tilestamp.simulator.work import Work
@@ -42,7 +37,3 @@ class Executor:
         if self.counting:
             self.works += result.works
         return result
-
-    def last(self, stage: Divisible[P, T], *inputs: P.args, **options: P.kwargs) -> StageResult[T]:
-        """Run a stage whose outputs only the picture needs."""
-        return self(stage, *inputs, **options)

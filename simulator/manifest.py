@@ -39,20 +39,18 @@ class Origin:
         Of the scene's arrays.
     matrix : ndarray, (4, 4), float64
         Model to clip space.
-    seed : int
     date : str
         Of the execution, ISO 8601, UTC.
     """
 
     scene_digest: str
     matrix: NDArray[np.float64]
-    seed: int
     date: str
 
 
-def origin_of(scene: Scene, matrix: NDArray[np.float64], seed: int) -> Origin:
+def origin_of(scene: Scene, matrix: NDArray[np.float64]) -> Origin:
     """Describe what a run is about to come from."""
-    return Origin(scene_digest(scene), matrix, seed, now())
+    return Origin(scene_digest(scene), matrix, now())
 
 
 def now() -> str:
@@ -132,7 +130,7 @@ def note_run(scene: str, origin: Origin | None, pipeline: str, machine: Machine,
         used.note("mixes", mix["name"], mix["digest"])
     if origin is not None:
         used.note("scenes", scene, origin.scene_digest)
-        text = f"{origin.scene_digest} {machine.digest} {origin.matrix.tolist()} {origin.seed} {settings}"
+        text = f"{origin.scene_digest} {machine.digest} {origin.matrix.tolist()} {settings}"
         digest = hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
         used.note("runs", f"{scene} by {pipeline} on {machine.name}", digest)
 

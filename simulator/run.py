@@ -133,7 +133,5 @@ class Run(PricedFrame):
             "camera": origin.matrix.tolist() if origin else None,
             "width": self.width,
             "height": self.height,
-            "seed": origin.seed if origin else None,
             "fidelity": self.fidelity,
-            "error": self.error,
         }

@@ -45,8 +45,7 @@ def _time(run: PricedFrame) -> str:
         milliseconds = run.milliseconds
     except TilestampError as error:  # to say what a run is never fails
         return f"no time ({error})"
-    spread = f" +- {run.milliseconds_interval.half_width:.2g} (95 %)" if run.sampled else ""
-    return f"{milliseconds:.4g} ms{spread}"
+    return f"{milliseconds:.4g} ms"
 
 
 def card(run: PricedFrame) -> str:

@@ -15,8 +15,6 @@ from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import Options, plain
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.sampling.completed import completed
-from tilestamp.simulator.sampling.executor import SampledExecutor
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.scenes.camera import clip_matrix
 from tilestamp.simulator.scenes.camera_files import CameraSource
@@ -34,8 +32,6 @@ def simulate(
     height: int = 768,
     camera: CameraSource = None,
     fidelity: Fidelity = "schedule",
-    error: float = 0.0,
-    seed: int = 0,
     counting: bool = True,
     picture: bool = True,
     **options: Any,
@@ -57,13 +53,6 @@ def simulate(
         scene's default view if not given.
     fidelity : {"counts", "bounds", "schedule"}
         How far to go: no time; a roofline for each launch; units of work scheduled on the machine.
-    error : float
-        Relative error that will do, 0 to 1. Above 0 the expensive stages execute a random part of their units, no
-        picture is drawn, and each number carries its 95 % interval (``Run.intervals``); the part grows until the
-        half-width of each stage's instructions and sample tests and hits, and of the frame's time, is under ``error``
-        of their value. Frames too small to pay for a sample run in full, and so do stages whose tail decides.
-    seed : int
-        Of the random part.
     counting : bool
         Count what the machine does; without it there is a picture, and nothing to price.
     picture : bool
@@ -80,10 +69,8 @@ def simulate(
     TilestampError
         Bad input, in one sentence.
     """
-    drawing = Drawing(
-        width=width, height=height, fidelity=fidelity, error=error, seed=seed, counting=counting, picture=picture
-    )
-    width, height, error, counting = drawing.width, drawing.height, drawing.error, drawing.counting
+    drawing = Drawing(width=width, height=height, fidelity=fidelity, counting=counting, picture=picture)
+    width, height, counting = drawing.width, drawing.height, drawing.counting
     chosen = pipeline_options(pipeline, options)
     machine = load_machine(machine)
     if chosen.votes or (drawing.fidelity != "counts" and counting):
@@ -93,19 +80,13 @@ def simulate(
     seen_by = read_camera(camera, scene)
     matrix = clip_matrix(seen_by, width, height)
     view = pinhole_camera(seen_by, width, height) if chosen.splats else matrix
-    sampled = error and counting
-    execute = (
-        SampledExecutor(error, drawing.seed, pipeline, machine)
-        if sampled
-        else Executor(counting=counting, picture=drawing.picture)
-    )
+    execute = Executor(counting=counting, picture=drawing.picture)
     frame = load_pipeline(pipeline)(scene, view, width, height, machine.simt, chosen, execute)
-    origin, asked = origin_of(scene, matrix, drawing.seed), plain(chosen)
-    run = Run(
-        scene.name, pipeline, machine, width, height, drawing.fidelity, asked, frame, scene.note, error,
+    origin, asked = origin_of(scene, matrix), plain(chosen)
+    return Run(
+        scene.name, pipeline, machine, width, height, drawing.fidelity, asked, frame, scene.note,
         counted=counting, origin=origin,
     )  # fmt: skip
-    return completed(run, execute) if isinstance(execute, SampledExecutor) else run
 
 
 class Drawing(Options, frozen=True, kw_only=True):
@@ -117,10 +98,6 @@ class Drawing(Options, frozen=True, kw_only=True):
     """Pixels."""
     fidelity: Fidelity
     """How far to go."""
-    error: Annotated[float, Meta(ge=0, lt=1)]
-    """Share of the value that will do."""
-    seed: Annotated[int, Meta(ge=0)]
-    """Of the random part."""
     counting: bool
     """Whether to count."""
     picture: bool

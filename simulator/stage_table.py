@@ -12,7 +12,6 @@ from tilestamp.models.events import INSTRUCTION_CLASSES, MachineEvent
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine
 from tilestamp.models.timing import Timing
-from tilestamp.simulator.sampling.estimate import Estimate
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
 
@@ -21,7 +20,6 @@ def stage_table(
     launches: Sequence[Launch | PipeLaunch],
     timings: Sequence[Timing],
     machine: Machine,
-    intervals: Mapping[tuple[str, str], Estimate],
 ) -> dict[str, dict[str, Any]]:
     """Gather launches by stage.
 
@@ -30,8 +28,6 @@ def stage_table(
     works, launches, timings : sequences of equal length, in launch order
     machine : Machine
         On which they were priced.
-    intervals : mapping of (stage, number) to Estimate
-        Of what was sampled.
 
     Returns
     -------
@@ -42,7 +38,7 @@ def stage_table(
     for part in zip(works, launches, timings, strict=True):
         stages.setdefault(part[0].stage, []).append(part)
     counters = declared(works)
-    rows = {stage: _row(parts, machine, counters) | _ends(stage, intervals) for stage, parts in stages.items()}
+    rows = {stage: _row(parts, machine, counters) for stage, parts in stages.items()}
     columns = dict.fromkeys(name for row in rows.values() for name in row)
     return {stage: {name: _builtin(row.get(name, np.nan)) for name in columns} for stage, row in rows.items()}
 
@@ -117,12 +113,3 @@ def _terms(timings: list[Timing]) -> dict[str, float]:
         for name, milliseconds in timing.terms.items():
             terms[f"{name}_ms"] = terms.get(f"{name}_ms", 0.0) + milliseconds
     return terms
-
-
-def _ends(stage: str, intervals: Mapping[tuple[str, str], Estimate]) -> dict[str, float]:
-    """Ends of the intervals of one stage, a column each (``milliseconds_low``, ``milliseconds_high``...)."""
-    ends: dict[str, float] = {}
-    for (owner, name), estimate in intervals.items():
-        if owner == stage:
-            ends |= {f"{name}_low": estimate.low, f"{name}_high": estimate.high}
-    return ends

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
-from tilestamp.simulator.sampling.strata import Sample
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,8 +37,6 @@ class Work:
         Global atomic requests by 32-byte chunk of the target buffer.
     variant : str
         How the kernel was compiled, where that changes its code (``"tile 8 spp 4"``): a mix may price it by itself.
-    sample : Sample or None
-        The units that ran, where not all did: the rows of the others are estimates.
     """
 
     stage: str
@@ -53,7 +50,6 @@ class Work:
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
     variant: str = ""
-    sample: Sample | None = field(default=None, repr=False)
 
     @property
     def counters(self) -> tuple[Counter, ...]:
@@ -61,9 +57,8 @@ class Work:
         return counters_of(self.events)
 
     def units(self, event: str) -> list[NDArray[np.int64]]:
-        """An event in each unit, where the stage counts it and all units ran."""
-        counted = event in self.events.__members__ and (self.sample is None or self.sample.complete)
-        return [self.table[:, self.events[event]]] if counted else []
+        """An event in each unit, where the stage counts it."""
+        return [self.table[:, self.events[event]]] if event in self.events.__members__ else []
 
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""

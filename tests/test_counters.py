@@ -1,9 +1,7 @@
 """Counters: what a stage declares beside its events is what reports show, and nothing else has to be edited."""
 
 import json
-from dataclasses import replace
 from enum import IntEnum
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -99,12 +97,6 @@ def test_what_a_stage_declares_is_in_the_printed_table(run, capsys):
     assert {"40", "64", "0.2500", "20.0", "30.0"} <= set(printed[2].split())
 
 
-def test_counts_that_are_declared_have_an_interval(run):
-    assert run.intervals["luck", "tries"].value == 40
-    assert run.intervals["frame", "tries"].value == 40
-    assert ("luck", "luck") not in run.intervals
-
-
 def test_two_stages_may_mean_different_events_by_one_name():
     @shown(count("HITS", "tries by another name", "tries"))
     class OtherEvent(IntEnum):
@@ -119,12 +111,6 @@ def test_the_launches_of_a_stage_are_one_distribution():
     (counter,) = (c for c in counters_of(LuckEvent) if c.kind == "distribution")
     found = counter.values({}, [np.array([1, 2]), np.array([9])])
     assert found == {"load_mean": 4.0, "load_max": 9.0}
-
-
-def test_estimates_of_units_that_did_not_run_are_no_distribution():
-    work = luck([1, 10, 2, 64], [1, 30, 8, 0])
-    assert [units.tolist() for units in work.units("TRIES")] == [[10, 30]]
-    assert replace(work, sample=SimpleNamespace(complete=False)).units("TRIES") == []
 
 
 def test_a_ratio_of_nothing_is_no_number():

@@ -12,7 +12,6 @@ from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import cudaraster as module
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 from tilestamp.simulator.scenes.scene import Mesh, Scene
-from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 
 EYE = np.eye(4)
@@ -122,18 +121,6 @@ def test_a_first_frame_executes_the_stages_of_attempts_that_fail(monkeypatch):
     for stage in STAGES:
         tables = [work.table for work in works if work.stage == stage]
         assert all(np.array_equal(table, tables[0]) for table in tables)
-
-
-def test_a_sampled_draw_repeats_the_same_stages(monkeypatch):
-    monkeypatch.setattr(module.bins, "initial_capacity", lambda *_: 1)
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.UNITS_AN_SM", 0)
-    run = simulate(
-        soup(count=600), "cudaraster", "gtx480", width=300, height=300, camera=EYE, error=0.5, first_frame=True
-    )
-    assert run.sampled
-    assert [work.stage for work in run.frame.works] == [*STAGES[:2], *STAGES]
-    assert run.frame.facts["retries"] == 1
 
 
 def test_counting_off_changes_no_picture():

@@ -39,7 +39,7 @@ def test_a_machine_is_taken_as_it_is():
 
 
 def test_sizes_are_taken_as_whole_floats_and_numpy_numbers():
-    run = draw(width=48.0, height=np.int16(36), error=np.float32(0), seed=np.uint8(3), picture=np.True_)
+    run = draw(width=48.0, height=np.int16(36), picture=np.True_)
     assert (run.width, run.height) == (48, 36)
     assert run.image.shape == (36, 48, 3)
 
@@ -72,8 +72,6 @@ def test_cameras_are_taken_as_matrices_and_objects(camera):
         ({"width": 10**12}, "width takes a whole number of 1 or more that fits in 32 bits"),
         ({"width": 10**9, "height": 10**9}, "memory"),
         ({"fidelity": "exact"}, "fidelity takes counts, bounds or schedule, not 'exact'"),
-        ({"error": "small"}, "error takes a number from 0 to below 1, not 'small'"),
-        ({"seed": -1}, "seed takes"),
         ({"picture": "no"}, "picture takes true or false, not 'no'"),
     ],
 )

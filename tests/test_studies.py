@@ -7,7 +7,6 @@ import pytest
 
 from tilestamp import LookAt, Study, TilestampError, altered, load_machine, simulate
 from tilestamp.experiments.studies import work
-from tilestamp.experiments.studies.question import Candidate, may_be_best
 
 TINY = {"scene": "teapot", "size": "64x48"}
 
@@ -187,43 +186,3 @@ def test_zoom_and_orbit_move_the_camera(executions):
     ((_, keywords),) = executions
     nearer = LookAt((4.0, 0.0, 1.5), (0.0, 0.0, 1.5), (0.0, 0.0, 1.0), near=0.05)
     np.testing.assert_allclose(keywords["camera"].matrix(64, 48), nearer.matrix(64, 48), atol=1e-12)
-
-
-def candidate(order, low, high, **shown):
-    return Candidate(order, shown, low, high)
-
-
-def test_only_what_may_be_the_best_at_its_place_and_is_not_known_well_is_run_again():
-    cells = [
-        candidate(0, 9.0, 11.0, tile=4, zoom=1),
-        candidate(1, 10.0, 12.0, tile=8, zoom=1),
-        candidate(2, 11.5, 13.0, tile=16, zoom=1),  # above the upper end of the first
-        candidate(3, 10.99, 11.0, tile=32, zoom=1),  # known well enough
-        candidate(4, 5.0, 6.0, tile=4, zoom=2),  # the best of its place
-        candidate(5, 7.0, 8.0, tile=8, zoom=2),
-    ]
-    assert may_be_best("tile", cells, 0.01) == {0, 1}
-    assert may_be_best("zoom", cells, 0.01) == set()
-
-
-def test_a_question_runs_coarse_first_and_then_finer_what_may_be_the_best(executions, monkeypatch):
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0.0)
-    fixed = {"scene": "teapot", "size": "160x120", "bound": 4, "sm.count": 2}
-    variants = {"8": {"tile": 8}, "9": {"tile": 8, "sm.clock_mhz": 1297}, "slow": {"tile": 4, "sm.clock_mhz": 300}}
-    study = Study(fixed=fixed, grid={"variant": variants}, error=0.0005, best="variant")
-    summary = study.run(jobs=1)
-    table = study.table()
-    assert [keywords["error"] for _, keywords in executions][:2] == [0.1, 0.1]
-    assert {keywords["error"] for _, keywords in executions[2:]} == {0.0005}
-    assert table["coarse"].tolist() == [False, False, True]
-    assert summary.coarse == 1
-    assert table["milliseconds_low"][2] < table["milliseconds"][2] < table["milliseconds_high"][2]
-    exact = simulate("teapot", machine=altered(load_machine("gtx280"), {"sm.count": 2}), width=160, height=120)
-    assert table["milliseconds"][0] == pytest.approx(exact.milliseconds, rel=0.0005)
-
-
-def test_a_frame_too_small_to_sample_has_an_interval_of_no_width():
-    study = Study(fixed={"scene": "teapot", "size": "64x48"}, error=0.05)
-    study.run(jobs=1)
-    cell = study.table().iloc[0]
-    assert cell["milliseconds_low"] == cell["milliseconds"] == cell["milliseconds_high"]

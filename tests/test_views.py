@@ -65,14 +65,6 @@ def test_the_line_of_a_run_says_what_on_what_and_how_long(run):
     assert repr(run) == f"<Run: teapot by micropolygon on gtx280, 160x120: {run.milliseconds:.4g} ms>"
 
 
-def test_the_line_of_a_sampled_run_has_its_interval(monkeypatch):
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.PAYS", 0)
-    monkeypatch.setattr("tilestamp.simulator.sampling.executor.UNITS_AN_SM", 0)
-    run = simulate("teapot", machine="gtx280", width=320, height=240, bound=3, error=0.3, picture=False)
-    assert run.sampled
-    assert f"+- {run.milliseconds_interval.half_width:.2g} (95 %)" in repr(run)
-
-
 @pytest.mark.parametrize(
     ("given", "told"), [({"counting": False}, "nothing was counted"), ({"fidelity": "counts"}, "counted, not priced")]
 )

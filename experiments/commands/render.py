@@ -29,8 +29,6 @@ def render(
     zoom: float = 1.0,
     texture: Path | None = None,
     fidelity: Literal["counts", "bounds", "schedule"] = "schedule",
-    error: float = 0.0,
-    seed: int = 0,
     counting: bool = True,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
@@ -65,11 +63,6 @@ def render(
         Image to lay over a mesh that has texture coordinates, or over each patch.
     fidelity
         counts: no time; bounds: a roofline for each launch; schedule: units of work scheduled on the machine.
-    error
-        Relative error that will do, such as 0.01: expensive stages execute a random part of their blocks, every number
-        gets its 95 % interval, and there is no picture.
-    seed
-        Seed of the random part that --error executes.
     counting
         Count what the machine does; without it there is a picture and no time.
     output
@@ -103,10 +96,8 @@ def render(
         check_file(trace, "--trace", ".json.gz")
     if (why or tornado or trace or timeline) and (fidelity == "counts" or not counting):
         raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
-    if error and output is not None:
-        raise TilestampError("--error draws only part of the blocks, which makes no picture: leave out -o or --error")
     wanted = Wanted(scene, pipeline, machine, parse_size(size), camera, zoom, texture, map_, set_, flags, option)
-    asked: dict[str, Any] = {"fidelity": fidelity, "error": error, "seed": seed, "counting": counting}
+    asked: dict[str, Any] = {"fidelity": fidelity, "counting": counting}
     with progress(f"drawing {scene}") as say:
         run, chosen = draw(wanted, picture=output is not None, **asked)
         if run.counted or output is None:  # without counts there is only a picture

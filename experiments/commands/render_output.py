@@ -47,24 +47,12 @@ def as_json(run: Run) -> dict[str, Any]:
         "options": run.options,
         "milliseconds": run.milliseconds if run.counted else None,
         "error_interval_milliseconds": run.error_interval if _error_is_known(run) else None,
-        **_sampling(run),
         "stages": stages,
         "counters": {name: {"title": c.title, "kind": c.kind} for name, c in run.counters.items()},
         "counts": run.counts if run.counted else {},
         "facts": run.frame.facts,
         "warnings": list(run.frame.remarks),
         "manifest": run.manifest(),
-    }
-
-
-def _sampling(run: Run) -> dict[str, Any]:
-    """What was sampled, and the intervals; nothing for a run that executed everything."""
-    if not run.sampled:
-        return {}
-    return {
-        "error": run.error,
-        "sampled": run.sampled,
-        "intervals": {f"{stage}.{name}": estimate for (stage, name), estimate in run.intervals.items()},
     }
 
 
@@ -79,7 +67,6 @@ def print_run(run: Run, output: Path | None, map_: str | None = None, columns: s
         _shown_error(run),
         run.note,
         *run.frame.remarks,
-        _shown_sample(run),
         f"picture: {output}" if output else "",
     ]
     lines += [f"map of {map_}: {map_path(output, map_)}"] if output and map_ else []
@@ -87,14 +74,12 @@ def print_run(run: Run, output: Path | None, map_: str | None = None, columns: s
 
 
 def _shown_time(run: Run) -> str:
-    """Show the frame's milliseconds, with their interval where the run was sampled."""
+    """Show the frame's milliseconds."""
     if not run.counted:
         return "nothing was counted, so there is no time"
     if run.fidelity == "counts":
         return "counts, no time"
-    if not run.sampled:
-        return f"{run.milliseconds:.4g} ms"
-    return f"{run.milliseconds:.4g} ms +- {run.milliseconds_interval.half_width:.2g} (95 %)"
+    return f"{run.milliseconds:.4g} ms"
 
 
 def _shown_error(run: Run) -> str:
@@ -113,16 +98,3 @@ def _shown_error(run: Run) -> str:
 def _error_is_known(run: Run) -> bool:
     """Whether the frame has a time, by the schedule: the residuals are of such times."""
     return run.counted and run.fidelity == "schedule" and run.milliseconds == run.milliseconds
-
-
-def _shown_sample(run: Run) -> str:
-    """Say which part was executed, and how sure the main numbers are."""
-    if not run.sampled:
-        return ""
-    parts = ", ".join(f"{ran} of {units} units of {kernel}" for kernel, (ran, units) in run.sampled["units"].items())
-    wide = ", ".join(
-        f"{name.replace('_', ' ')} {100 * estimate.relative:.2g} %"
-        for (stage, name), estimate in run.intervals.items()
-        if stage == "frame"
-    )
-    return f"executed: {parts}\n95 % intervals of the frame, half-width: {wide}"

@@ -1,15 +1,14 @@
-"""Frontier of the model itself: what each fidelity and sampling rate costs, and how far its answer is off.
+"""Frontier of the model itself: what each fidelity costs, and how far its answer is off.
 
-Set TILESTAMP_FRONTIER=long for more frames, rates and seeds (minutes).
+Set TILESTAMP_FRONTIER=long for more frames (minutes).
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
-from tilestamp.experiments.frontier.model_frames import Timed, frames, is_long, warnings
+from tilestamp.experiments.frontier.model_frames import Timed, frames, warnings
 from tilestamp.experiments.frontier.model_notes import BOUNDS, COUNTS, FULL, notes
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.published import published
@@ -32,9 +31,7 @@ SOURCE = (
     "published (detailed_simulators.csv names each source)"
 )
 FIDELITIES: dict[Fidelity, str] = {"schedule": FULL, "bounds": BOUNDS, "counts": COUNTS}
-RATES, RATES_LONG = (0.05, 0.02), (0.1, 0.05, 0.02, 0.01)
-SEEDS, SEEDS_LONG = (1,), (1, 2, 3, 4, 5)
-EXECUTED = "ours, all units executed"
+EXECUTED = "ours, executed"
 CHART = Chart(
     name="methods", kind="front", table="methods", title="Seconds that an answer takes, against its error.",
     alt="Scatter plot: mean error of a frame's time, against the full run, over CPU seconds.",
@@ -95,25 +92,12 @@ def _answer(ours: "pd.DataFrame") -> str:
 
 
 def _answers(frame: Timed) -> list[Answer]:
-    """Execute in full and price at each fidelity; execute samples and price them. The full one comes first."""
-    frame.warm_up(RATES[0])
-    answers = []
-    drawn, seconds = _timed(frame.simulate)
-    for fidelity, method in FIDELITIES.items():
-        answers.append(_priced(frame, drawn, fidelity, method, seconds))
-    frame.simulate(error=RATES[0])  # compiles what only samples run: the frames of the warm-up are too small for one
-    for rate in RATES_LONG if is_long() else RATES:
-        for seed in SEEDS_LONG if is_long() else SEEDS:
-            drawn, seconds = _timed(frame.simulate, error=rate, seed=seed)
-            answers.append(_priced(frame, drawn, "schedule", f"schedule, sampled to {rate:.0%}", seconds))
-    return answers
-
-
-def _timed(act: Callable[..., Run], **options: Any) -> tuple[Run, float]:
-    """Do it; CPU seconds of all threads."""
+    """Execute, and price at each fidelity; the full one comes first."""
+    frame.warm_up()
     start = time.process_time()
-    made = act(**options)
-    return made, time.process_time() - start
+    drawn = frame.simulate()
+    seconds = time.process_time() - start
+    return [_priced(frame, drawn, fidelity, method, seconds) for fidelity, method in FIDELITIES.items()]
 
 
 def _priced(frame: Timed, drawn: Run, fidelity: Fidelity, method: str, seconds: float) -> Answer:
@@ -190,8 +174,7 @@ def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
 def _points(ours: "pd.DataFrame", column: str) -> "pd.DataFrame":
     import pandas as pd
 
-    group = ["ours, sampled" if "sampled" in name else EXECUTED for name in ours.method]
-    points = {"name": ours.method, "group": group, "cost": ours.cpu_seconds, "error": 100 * ours[column]}
+    points = {"name": ours.method, "group": EXECUTED, "cost": ours.cpu_seconds, "error": 100 * ours[column]}
     return pd.DataFrame({**points, "published": False}).dropna(subset="error")  # counts have no time
 
 
@@ -200,11 +183,10 @@ def _draw_full(ours: "pd.DataFrame", frames_: int, path: "Path") -> None:
 
     points = _points(ours, "error_against_full")
     points["front"] = pareto_front(points.cost, points.error)
-    again = points[points.group == EXECUTED]
-    again = again.assign(
-        name=again.name.str.replace("all units", "priced again"),
+    again = points.assign(
+        name=points.name.str.replace("executed", "priced again"),
         group="ours, priced again: no executing",
-        cost=ours.pricing_seconds[again.index],
+        cost=ours.pricing_seconds[points.index],
         front=False,  # there must have been an execution
     )
     points = pd.concat([points, again])

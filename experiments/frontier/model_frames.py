@@ -56,16 +56,14 @@ class Timed:
     known_ms: float
     kind: str
 
-    def simulate(self, **more: Any) -> Run:
+    def simulate(self) -> Run:
         """Execute it, without a picture."""
-        return simulate(self.scene, self.pipeline, self.machine, picture=False, **self.arguments, **more)
+        return simulate(self.scene, self.pipeline, self.machine, picture=False, **self.arguments)
 
-    def warm_up(self, error: float) -> None:
-        """Compile its kernels, in full and sampled, on a small frame."""
+    def warm_up(self) -> None:
+        """Compile its kernels on a small frame."""
         small = self.arguments | {"width": 64, "height": 48, "camera": None}
-        for asked in (0.0, error):
-            run = simulate("teapot", self.pipeline, self.machine, picture=False, **small, error=asked)
-            self.milliseconds_of(run)
+        self.milliseconds_of(simulate("teapot", self.pipeline, self.machine, picture=False, **small))
 
 
 def is_long() -> bool:

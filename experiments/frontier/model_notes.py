@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-FULL, BOUNDS, COUNTS = (f"{fidelity}, all units" for fidelity in ("schedule", "bounds", "counts"))
+FULL, BOUNDS, COUNTS = (f"{fidelity}, executed" for fidelity in ("schedule", "bounds", "counts"))
 
 
 def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.DataFrame") -> list[str]:
@@ -24,7 +24,6 @@ def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", b
     """
     return [
         _about(table, ours),
-        *_about_sampling(ours),
         *_about_others(ours, theirs, beside),
     ]
 
@@ -40,16 +39,6 @@ def _about(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
         f"rest executes: counts alone, without any time, still take {counts.cpu_seconds:.2f} s. Pricing by bounds "
         f"takes {bounds.pricing_seconds * 1e3:.0f} ms and is {_off(bounds)}."
     )
-
-
-def _about_sampling(ours: "pd.DataFrame") -> list[str]:
-    full = ours.set_index("method").loc[FULL]
-    sampled = ours[ours.method.str.contains("sampled")]
-    return [
-        f"{row.method}: {row.cpu_seconds / full.cpu_seconds:.0%} of the full run's time, {_off(row)}; its "
-        f"warp instructions are {100 * row.error_of_instructions:.2f} % off."
-        for _, row in sampled.iterrows()
-    ]
 
 
 def _off(row: "pd.Series") -> str:

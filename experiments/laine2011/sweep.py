@@ -61,7 +61,7 @@ def draw(area: float, name: str = MACHINE) -> tuple[Run, int]:
     assert scene.mesh is not None  # noqa: S101 - a sweep is a mesh
     nothing = np.empty((0, 0, 3), np.uint8)
     bare = Frame(nothing, nothing, frame.works, facts=frame.facts)
-    origin = origin_of(scene, np.eye(4), seed=0)
+    origin = origin_of(scene, np.eye(4))
     run = Run(scene.name, "cudaraster", machine, WIDTH, HEIGHT, "schedule", plain(options), bare, origin=origin)
     return run, len(scene.mesh.triangles)
 

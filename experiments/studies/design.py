@@ -18,8 +18,6 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.pipelines import options_type, pipeline_names
 
-COARSE = 0.1  # relative error at which the cells of a question are run first
-
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
@@ -30,7 +28,7 @@ class Design:
     title : str
     fixed : mapping
         Parameters that all cells have: ``scene``, ``camera``, ``zoom``, ``orbit``, ``size``, ``pipeline`` and its
-        options, ``machine``, ``fidelity``, ``seed``, numbers of the machine (``memory.dram_gb_per_s``), or factors of
+        options, ``machine``, ``fidelity``, numbers of the machine (``memory.dram_gb_per_s``), or factors of
         them (``times.memory.dram_gb_per_s``).
     grid, zip : mapping of str to axis
         An axis is a list of values of the parameter of that name; a range ``{"from": 1, "to": 4, "points": 5, "scale":
@@ -39,11 +37,6 @@ class Design:
         ``{"points": 64, "method": "sobol", "seed": 0, "axes": {...}}``; a range has no points of its own.
     record : sequence of str
         What is recorded (``experiments.studies.record``).
-    error : float
-        Relative error of a time that will do: expensive stages execute a random part of their units.
-    best : str
-        Axis of which the best value (the shortest time) is wanted for each of the other places. With ``error``, all
-        cells are run at a coarser one first, and only those again that may be the best.
     store : Store, str or Path, optional
         Where cells are kept; in memory if not given.
 
@@ -59,22 +52,12 @@ class Design:
     zip: Mapping[str, Axis] = field(default_factory=dict)
     sample: Sample | Mapping[str, Any] | None = None
     record: Sequence[str] = ("milliseconds",)
-    error: float = 0.0
-    best: str = ""
     store: Store | str | Path | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.error < 1.0:
-            with place("error"):
-                raise TilestampError(f"an error is a share from 0 to below 1, not {self.error:g}")
         with place("record"):
             if isinstance(self.record, str) or not self.record:
                 raise TilestampError("record is a list of names, such as ['milliseconds', 'tile_raster.milliseconds']")
-        with place("best"):
-            if self.best and self.best not in self.axes:
-                raise TilestampError(
-                    f"best is an axis, and there is none called {self.best}{did_you_mean(self.best, self.axes)}"
-                )
 
     @cached_property
     def factors(self) -> list[Factor]:
@@ -138,11 +121,6 @@ class Design:
     def kept(self) -> Store:
         """The store, open."""
         return self.store if isinstance(self.store, Store) else Store(Path(self.store) if self.store else None)
-
-    @property
-    def errors(self) -> list[float]:
-        """Errors at which cells are run, one after another."""
-        return [COARSE, self.error] if self.best and 0.0 < self.error < COARSE else [self.error]
 
 
 def _check_apart(parts: Sequence[tuple[tuple[str, ...], Factor]]) -> None:

@@ -22,15 +22,13 @@ class Forecast:
     cells: int
     stored: int
     executions: int
-    """At least, where not ``exact``; with a question, of the coarser pass, and at most as many again."""
+    """At least, where not ``exact``."""
     seconds: float
     """Of this computer, on ``jobs`` processes."""
     jobs: int
     guessed: bool
     """Whether nothing of the kind was run before with this store."""
     exact: bool
-    again: bool = False
-    """Whether some cells are run a second time, at a finer error."""
 
     @property
     def todo(self) -> int:
@@ -44,9 +42,8 @@ class Forecast:
         stored = f", {self.stored:,} of them stored" if self.stored else ""
         executions = f"{'' if self.exact else 'at least '}{count(self.executions, 'execution')}"
         how = "a guess: nothing like it was run with this store" if self.guessed else "as long as earlier ones took"
-        again = "; those that may be the best are run again, finer" if self.again else ""
         return (
-            f"{count(self.cells, 'cell')}{stored}; to be run: {self.todo:,}, by {executions}{again};"
+            f"{count(self.cells, 'cell')}{stored}; to be run: {self.todo:,}, by {executions};"
             f" about {duration(self.seconds)} in {count(self.jobs, 'process')} ({how})"
         )
 
@@ -55,7 +52,7 @@ def forecast(study: Design, resolver: Resolver, jobs: int | None = None) -> Fore
     """Say what a run would do; all names and values are checked on the way."""
     if len(study) > MOST_LISTED:
         return _large(study, resolver, jobs)
-    return forecast_of(study, list(missing(study, resolver, study.errors[0])), jobs)
+    return forecast_of(study, list(missing(study, resolver)), jobs)
 
 
 def forecast_of(study: Design, groups: Sequence[Group], jobs: int | None) -> Forecast:
@@ -70,7 +67,6 @@ def forecast_of(study: Design, groups: Sequence[Group], jobs: int | None) -> For
         jobs=jobs or worthwhile(seconds, groups),
         guessed=guessed,
         exact=True,
-        again=len(study.errors) > 1,
     )
 
 
@@ -97,7 +93,7 @@ def _seconds(groups: Sequence[Group], store: Store) -> tuple[float, bool]:
 
 def _large(study: Design, resolver: Resolver, jobs: int | None) -> Forecast:
     """Of more cells than can be looked up: from the first group on."""
-    first = next(missing(study, resolver, study.errors[0]))
+    first = next(missing(study, resolver))
     rate = study.kept.seconds(first.execution.pipeline)
     jobs = jobs or os.cpu_count() or 1
     seconds = (rate or GUESS).pricing_seconds * len(study) / jobs

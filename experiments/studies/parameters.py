@@ -4,10 +4,9 @@ import hashlib
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
-from msgspec import Meta
 
 from tilestamp.experiments.harness.sources import sources_digest
 from tilestamp.experiments.studies.places import place
@@ -49,8 +48,6 @@ class Execution:
     width: int
     height: int
     matrix: list[list[float]]
-    seed: int
-    error: float
     sources: str
     persistent: bool
     """Whether the work depends on the number of SMs."""
@@ -87,7 +84,7 @@ class Resolver:
     """Digest of each input that was used, by kind and name."""
     _known: dict[Hashable, Any] = field(default_factory=dict)
 
-    def execution(self, parameters: Mapping[str, Any], error: float = 0.0) -> Execution:
+    def execution(self, parameters: Mapping[str, Any]) -> Execution:
         """Resolve what is executed; raises StudyError."""
         given: dict[str, Any] = SHARED | {name: value for name, value in parameters.items() if not is_priced(name)}
         if "scene" not in given:
@@ -103,13 +100,9 @@ class Resolver:
             self.inputs["scene", scene.name] = digest
         matrix = self._matrix(scene, given, width, height)
         options = self._options(given)
-        with place("seed"):
-            seed = checked("seed", Annotated[int, Meta(ge=0)], given["seed"])
-        what = [digest, pipeline, options, width, height, matrix, seed, error, sources]
+        what = [digest, pipeline, options, width, height, matrix, sources]
         persistent = self.once(("persistent", pipeline), lambda: options_type(pipeline).persistent)
-        return Execution(
-            source, digest, pipeline, options, width, height, matrix, seed, error, sources, persistent, _digest(what)
-        )
+        return Execution(source, digest, pipeline, options, width, height, matrix, sources, persistent, _digest(what))
 
     def pricing(self, parameters: Mapping[str, Any]) -> Pricing:
         """Resolve on what it is priced; raises StudyError."""

@@ -50,9 +50,7 @@ def cell_count(factors: Sequence[Factor]) -> int:
     return prod(map(len, factors))
 
 
-def walk(
-    factors: Sequence[Factor], fixed: Mapping[str, Any], resolver: Resolver, error: float, most: int
-) -> Iterator[Group]:
+def walk(factors: Sequence[Factor], fixed: Mapping[str, Any], resolver: Resolver, most: int) -> Iterator[Group]:
     """Go through all cells.
 
     Parameters
@@ -62,8 +60,6 @@ def walk(
     fixed : mapping
         Parameters that all cells have.
     resolver : Resolver
-    error : float
-        Of the executions.
     most : int
         Cells of one group.
     """
@@ -73,7 +69,7 @@ def walk(
     gathered = list(map(_parts, factors))
     for parts in product(*gathered):
         executed = _united(fixed, (part.executed for part in parts))
-        execution = resolver.execution(executed, error)
+        execution = resolver.execution(executed)
         waiting: dict[Hashable, list[Cell]] = {}
         for row in product(*(part.choices for part in parts)):
             pricing = _pricing(fixed, [only for _, _, only in row if only], resolver, known)

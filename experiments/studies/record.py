@@ -40,14 +40,8 @@ class Recorded:
         return self._run.on(self._prices.machines[self._place])
 
     def values(self, names: Iterable[str]) -> dict[str, Number]:
-        """Give the values of some names, None where the run has nothing of the name, and the interval of a sample."""
-        found = {key: _plain(value) for name in names for key, value in self._named(name)}
-        if self._run.sampled:
-            _, low, high = self.run.milliseconds_interval
-            found |= {"milliseconds_low": low, "milliseconds_high": high}
-        elif self._run.error:  # too small to pay for a sample
-            found |= dict.fromkeys(("milliseconds_low", "milliseconds_high"), self._of(None, "milliseconds"))
-        return found
+        """Give the values of some names, None where the run has nothing of the name."""
+        return {key: _plain(value) for name in names for key, value in self._named(name)}
 
     def known(self) -> list[str]:
         """All names that the run has a value for."""

@@ -8,14 +8,13 @@ from itertools import islice
 from tilestamp.experiments.harness.pool import Pool, pool
 from tilestamp.experiments.harness.telling import duration, so_far
 from tilestamp.experiments.studies.axes import shown
-from tilestamp.experiments.studies.cells import MOST_LISTED, candidates, missing, rows
+from tilestamp.experiments.studies.cells import MOST_LISTED, missing, rows
 from tilestamp.experiments.studies.design import Design
 from tilestamp.experiments.studies.forecast import Forecast, count, forecast_of
 from tilestamp.experiments.studies.forecast import forecast as forecast_study
 from tilestamp.experiments.studies.names import Names
 from tilestamp.experiments.studies.parameters import Resolver
 from tilestamp.experiments.studies.plan import Group
-from tilestamp.experiments.studies.question import may_be_best
 from tilestamp.experiments.studies.values import PRICED, SHARED
 from tilestamp.experiments.studies.work import Outcome, Task, perform
 from tilestamp.models.errors import TilestampError
@@ -31,14 +30,11 @@ class Summary:
 
     cells: int = 0
     new: int = 0
-    """Cells that were run, some of them at two errors."""
     executions: int = 0
     seconds: float = 0.0
     saved_executions: int = 0
     saved_seconds: float = 0.0
     """What the priced cells would have taken, had each been executed."""
-    coarse: int = 0
-    """Cells that cannot be the best, and were left at the coarser error."""
     problems: int = 0
     faults: list[str] = field(default_factory=list)
     changed: list[str] = field(default_factory=list)
@@ -51,8 +47,6 @@ class Summary:
         if self.saved_executions > 0:
             about = f", about {duration(self.saved_seconds)}" if self.saved_seconds else ""
             said[0] += f"; repricing saved {count(self.saved_executions, 'execution')}{about}"
-        if self.coarse:
-            said.append(f"{count(self.coarse, 'cell')} cannot be the best, and stayed coarse (column coarse)")
         if self.problems:
             said.append(f"no time: {count(self.problems, 'cell')}; the column problem says why")
         return said + [f"failed: {fault}" for fault in dict.fromkeys(self.faults)]
@@ -64,25 +58,20 @@ def run_study(
     """Run what is not stored; see ``Study.run``."""
     begin = time.perf_counter()
     summary = Summary(cells=len(study))
-    groups, expected = _first(study, resolver, jobs)
+    groups, expected = _missing(study, resolver, jobs)
     summary.changed = _changed(study, resolver)
-    if expected.todo or len(study.errors) > 1:
+    if expected.todo:
         with pool(jobs or expected.jobs, cluster, say) as workers:
-            runner = _Runner(study, workers, summary, say, expected.todo, resolver)
-            runner.run(groups)
-            for error in study.errors[1:]:
-                wanted = may_be_best(study.best, candidates(study, resolver), error)
-                runner.run(missing(study, resolver, error, wanted))
-                summary.coarse = sum(cell.is_wider(error) for cell in candidates(study, resolver))
+            _Runner(study, workers, summary, say, expected.todo, resolver).run(groups)
     summary.seconds = time.perf_counter() - begin
     return summary
 
 
-def _first(study: Design, resolver: Resolver, jobs: int | None) -> tuple[Iterable[Group], Forecast]:
-    """Groups of the first pass, and what is expected of them."""
+def _missing(study: Design, resolver: Resolver, jobs: int | None) -> tuple[Iterable[Group], Forecast]:
+    """Groups that are missing, and what is expected of them."""
     if len(study) > MOST_LISTED:
-        return missing(study, resolver, study.errors[0]), forecast_study(study, resolver, jobs)
-    groups = list(missing(study, resolver, study.errors[0]))
+        return missing(study, resolver), forecast_study(study, resolver, jobs)
+    groups = list(missing(study, resolver))
     return groups, forecast_of(study, groups, jobs)
 
 
@@ -138,7 +127,7 @@ class _Runner:
                 self.summary.faults.append(result.fault)
                 continue
             parameters = SHARED | PRICED | dict(study.fixed) | group.parameters | cell.shown | cell.pricing.changes
-            parameters |= {"machine": cell.pricing.machine.name, "error": execution.error}
+            parameters["machine"] = cell.pricing.machine.name
             told = {name: shown(value) for name, value in parameters.items()}
             study.kept.put(cell.key, told, study.record, result.values or {}, result.problem)
             self.summary.new += 1

@@ -93,7 +93,7 @@ class Study(Design):
             Parameters of each, beside what is fixed.
         jobs : int, optional
         """
-        asked = replace(self, grid={}, zip={}, sample=None, best="", store=self.kept)
+        asked = replace(self, grid={}, zip={}, sample=None, store=self.kept)
         asked.__dict__["factors"] = [[Choice(dict(point), dict(point)) for point in points]]
         resolver = Resolver()
         asked.run(jobs, resolver=resolver)

@@ -23,8 +23,6 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
     zip: dict[str, Any] = {}
     sample: dict[str, Any] | None = None
     record: tuple[str, ...] = ("milliseconds",)
-    error: float = 0.0
-    best: str = ""
 
 
 class StudyFile:

@@ -18,7 +18,7 @@ from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.simulator.options import checked
 from tilestamp.simulator.pipelines import options_type
 
-SHARED = {"pipeline": "micropolygon", "size": "1024x768", "camera": None, "zoom": 1.0, "orbit": 0.0, "seed": 0}
+SHARED = {"pipeline": "micropolygon", "size": "1024x768", "camera": None, "zoom": 1.0, "orbit": 0.0}
 PRICED = {"machine": "gtx280", "fidelity": "schedule"}
 KNOWN = ("scene", *SHARED, *PRICED)
 TIMES = "times."  # before the name of a number: a factor of it
@@ -34,7 +34,7 @@ def is_whole(name: str, pipelines: Iterable[str]) -> bool:
     if "." in name:
         return _is_whole_number(name)
     kinds = [f.type for p in pipelines for f in msgspec.structs.fields(options_type(p)) if f.name == name]
-    return name == "seed" or (bool(kinds) and all(map(_takes_whole_numbers_only, kinds)))
+    return bool(kinds) and all(map(_takes_whole_numbers_only, kinds))
 
 
 @cache

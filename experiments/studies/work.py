@@ -119,14 +119,10 @@ class _Worker:
                 self.results[place] = Result(self._recorded(run, priced, row, fidelity), priced.refusals.get(row, ""))
 
     def _recorded(self, run: Run, priced: Prices, row: int, fidelity: Fidelity) -> dict[str, Number] | None:
-        """Values of one cell; a sample that was drawn for another machine, and does not do here, is drawn again."""
+        """Values of one cell."""
         if row in priced.refusals:
             return None
         recorded = Recorded(run.on(run.machine, fidelity), priced, row)
-        if run.sampled and recorded.run.milliseconds_interval.relative > run.error:
-            machine = priced.machines[row]
-            run = _executed(self.task.execution, machine, self.scene, self.outcome)
-            recorded = Recorded(run.on(machine, fidelity), prices(run, [machine], fidelity), 0)
         values = recorded.values(self.task.record)
         if None in values.values() and not self.outcome.known:
             self.outcome.known = recorded.known()
@@ -164,8 +160,7 @@ def _executed(execution: Execution, machine: Machine, scene: Scene, outcome: Out
     begin = time.perf_counter()
     run = simulate(
         scene, execution.pipeline, machine, width=execution.width, height=execution.height,
-        camera=ModelToClip(execution.matrix), error=execution.error, seed=execution.seed, picture=False,
-        **execution.options,
+        camera=ModelToClip(execution.matrix), picture=False, **execution.options,
     )  # fmt: skip
     outcome.executions += 1
     outcome.execution_seconds += time.perf_counter() - begin

@@ -169,7 +169,6 @@ def cudaraster(
         The machine's shape.
     options : CudarasterOptions
     execute : Executor
-        Several batches share their pixels: then all units run.
 
     Returns
     -------
@@ -258,7 +257,7 @@ def _draw_tiles(state: _State, setup: Setup, queues: TileQueues) -> tuple[FrameB
             blend=options.blend, layers=options.layers, lists=options.lists, room=options.room,
         )  # fmt: skip
         return buffers, works
-    return (execute.last if options.batches == 1 else execute)(
+    return execute(
         fine_raster, setup, queues.starts, queues.entries, queues.active, width, height, state.simt,
         release=options.release, samples=options.msaa, mode=options.mode, colors=state.colors, buffers=state.buffers,
     )[:2]  # fmt: skip

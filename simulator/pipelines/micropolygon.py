@@ -170,8 +170,7 @@ def micropolygon(
     count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
     start = execute(bucket_scan, count, simt).outputs
     lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
-    raster = execute if options.shading == "visible" else execute.last  # what is seen is needed again
-    pixels, drawn, _ = raster(
+    pixels, drawn, _ = execute(
         tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
         spp=options.spp, box_tests=options.box_tests, edges=options.edges,
         ids=options.shading == "visible",

@@ -19,7 +19,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import LINE_BYTES, SECTOR_BYTES, Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.stage import divisible
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     ALIGNMENTS,
@@ -36,7 +36,6 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     grids_together,
     shape_for,
 )
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_known import known_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
@@ -94,7 +93,6 @@ def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: Bloc
 def _raster_tiles(
     part: int,
     parts: int,
-    drawn: Any,
     vertices: Any,
     colors: Any,
     count: Any,
@@ -109,18 +107,17 @@ def _raster_tiles(
     ids: Any,
     table: Any,
 ) -> None:
-    """One part of the tiles ``drawn``; row i of the table is that of the i-th of them."""
+    """One part of the tiles."""
     size = shape.tile * shape.side
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
     addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     height, width = depth.shape
-    for i in range(drawn.size * part // parts, drawn.size * (part + 1) // parts):
-        block = drawn[i]
+    for block in range(count.size * part // parts, count.size * (part + 1) // parts):
         tile_row, column = block // tiles.columns, block % tiles.columns
         first, grids = np.int64(start[block]), np.int64(count[block])
-        row = None if table is None else table[i]
+        row = None if table is None else table[block]
         origin = (np.float64(column * shape.tile), np.float64(tile_row * shape.tile))
         samples.depth[:] = FAR
         samples.color[:] = BACKGROUND
@@ -137,7 +134,7 @@ def _raster_tiles(
 
 
 class Pixels(NamedTuple):
-    """What the tiles show; of tiles that were not drawn it means nothing."""
+    """What the tiles show."""
 
     image: NDArray[Any]  # (H, W, 3) bytes; with ``ids`` the number of the first vertex of each quad seen, (H, W) uint32
     depth: NDArray[np.float32]  # (H, W) of the nearest sample of each pixel; 1 where nothing was drawn
@@ -176,25 +173,6 @@ def _streams(
     return tuple(streams)
 
 
-def _work(
-    table: NDArray[np.int64],
-    vertices: NDArray[np.float32],
-    lists: NDArray[np.uint32],
-    tiles: Tiles,
-    simt: Simt,
-    *,
-    spp: int,
-    box_tests: bool,
-    edges: str,
-    ids: bool,
-    **_: Any,
-) -> Work:
-    """Work of the kernel, from the rows of all tiles and the inputs of ``tile_raster``."""
-    shape = shape_for(vertices, tiles, simt, spp=spp, box_tests=box_tests, edges=edges)
-    streams = _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
-    return raster_work(shape, table, streams, ids=ids)
-
-
 def raster_work(
     shape: BlockShape, table: NDArray[np.int64], streams: tuple[Stream, ...] = (), *, ids: bool = False
 ) -> Work:
@@ -212,7 +190,6 @@ def raster_work(
     )
 
 
-@divisible(known=known_tiles, work=_work)
 def tile_raster(
     vertices: NDArray[np.float32],
     count: NDArray[np.uint32],
@@ -228,8 +205,7 @@ def tile_raster(
     edges: Edges = "computed",
     ids: bool = False,
     counting: bool = True,
-    units: NDArray[np.int64] | None = None,
-) -> tuple[Pixels, NDArray[np.int64] | None]:
+) -> StageResult[Pixels]:
     """Draw the grids of each tile.
 
     Parameters
@@ -255,12 +231,10 @@ def tile_raster(
         Leave the number of the quad that is seen in place of its colour (not in the paper); one sample a pixel.
     counting : bool
         Without it no events are counted and no works come back.
-    units : ndarray, int64, optional
-        Tiles to draw, where not all.
 
     Returns
     -------
-    Pixels
+    outputs : Pixels
     works : one, a row a tile
 
     Raises
@@ -274,12 +248,15 @@ def tile_raster(
     image = np.empty((height, width, 3), np.uint8)
     depth = np.empty((height, width), np.float32)
     overdraw = np.empty((height, width), np.int32) if counting else None
-    blocks = np.arange(tiles.total) if units is None else units
-    table = np.zeros((len(blocks), len(_E)), np.int64) if counting else None
+    table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
     colors = None if ids else vertices.view(np.uint32)[:, :, 3]
     seen = np.full((height, width), BACKGROUND, np.uint32) if ids else None
     buffers = (image, depth, overdraw, seen, table)
-    parts = parts_of(len(blocks), _PART_TILES)
-    for_parts(_raster_tiles, parts, blocks, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
-    return Pixels(image if seen is None else seen, depth, overdraw), table
+    parts = parts_of(tiles.total, _PART_TILES)
+    for_parts(_raster_tiles, parts, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
+    pixels = Pixels(image if seen is None else seen, depth, overdraw)
+    if table is None:
+        return StageResult(pixels)
+    streams = _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
+    return StageResult(pixels, (raster_work(shape, table, streams, ids=ids),))

@@ -13,7 +13,7 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.stage import divisible
+from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
@@ -28,12 +28,13 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
 )
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import draw_tile_single
-from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work, known_tiles
+from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 Mode = Literal["depth", "blend", "depth-only", "color"]
+Lists = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]  # starts, entries, active tiles
 
 MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colour, interpolate
     "depth": (True, False, True, True),
@@ -227,7 +228,6 @@ def draw_of(
     )
 
 
-@divisible(known=known_tiles, work=fine_work)
 def fine_raster(
     setup: Setup,
     tile_starts: NDArray[np.int64],
@@ -246,8 +246,7 @@ def fine_raster(
     clear_color: int = 0,
     clear_depth: float = 1.0,
     counting: bool = True,
-    units: NDArray[np.int64] | None = None,
-) -> tuple[FrameBuffers, NDArray[np.int64] | None]:
+) -> StageResult[FrameBuffers]:
     """Draw the queued triangles of all active tiles.
 
     Parameters
@@ -278,14 +277,11 @@ def fine_raster(
     clear_depth : float
         0 to 1; release nvdiffrast always clears to 1.
     counting : bool
-    units : ndarray, int64, optional
-        Places in ``active_tiles`` of those to draw, where not all.
 
     Returns
     -------
     outputs : FrameBuffers
     works : one, a row an active tile
-
     """
     draw = draw_of(
         width, height, simt, release=release, mode=mode, samples=samples, clear=buffers is None,
@@ -293,14 +289,31 @@ def fine_raster(
     )._replace(peel=behind is not None)  # fmt: skip
     if colors is None:
         colors = np.ones((int(setup.planes[:, 13:].max(initial=0)) + 1 if draw.write_color else 1, 4), np.float32)
-    drawn = active_tiles if units is None else active_tiles[units]
     if buffers is None:
-        buffers = new_buffers(width, height, samples, cleared=units is None and len(drawn) < len(tile_starts) - 1)
-    table = np.zeros((len(drawn), len(FineRasterEvent)), np.int64) if counting else None
+        buffers = new_buffers(width, height, samples, cleared=len(active_tiles) < len(tile_starts) - 1)
+    lists = tile_starts, tile_entries, active_tiles
+    rows = draw_rows(setup, lists, draw, colors, buffers, behind, counting=counting)
+    if rows is None:
+        return StageResult(buffers)
+    work = fine_work(rows, setup, tile_entries, width, height, simt, release=release, samples=samples, mode=mode)
+    return StageResult(buffers, (work,))
+
+
+def draw_rows(
+    setup: Setup,
+    lists: Lists,
+    draw: Draw,
+    colors: NDArray[np.float32],
+    buffers: FrameBuffers,
+    behind: NDArray[np.uint32] | None = None,
+    *,
+    counting: bool = True,
+) -> NDArray[np.int64] | None:
+    """Draw into the buffers; a row of events an active tile."""
+    starts, entries, active = lists
+    rows = np.zeros((len(active), len(FineRasterEvent)), np.int64) if counting else None
+    several = True if draw.log_samples else None
     with np.errstate(all="ignore"):
-        for_parts(
-            _draw_part, parts_of(len(drawn), _PART_TILES),
-            drawn, tile_starts, tile_entries, setup, colors, draw, buffers, behind, True if samples > 1 else None,
-            table,
-        )  # fmt: skip
-    return buffers, table
+        parts = parts_of(len(active), _PART_TILES)
+        for_parts(_draw_part, parts, active, starts, entries, setup, colors, draw, buffers, behind, several, rows)
+    return rows

@@ -1,6 +1,4 @@
-"""Fine raster, what is known of tiles before they are drawn, and the work of those that were."""
-
-from typing import Any
+"""The work of fine raster, from the rows of its tiles."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +6,7 @@ from numpy.typing import NDArray
 from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.launch import SECTOR_BYTES, Stream
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stage import Known
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import HEADER_BYTES, PIXELS, SEGMENT, TILE, FineRasterEvent
-from tilestamp.simulator.stages.laine2011.tile_areas import tile_areas
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.work import Work
@@ -22,31 +18,6 @@ SHARED_BYTES = 48 << 10  # a block can have at most
 WORD_BYTES = 4 * PIXELS  # of a warp, for each further word that its pixels keep
 START_LOADS = 3  # of a warp that starts: whether a buffer was too small
 DRAW_REQUESTS = {"1.1": 1, "nvdiffrast": 2}  # of a draw, to one sector: the counter; and the number of tiles beside it
-SAMPLE_SECONDS, ENTRY_SECONDS = 50e-9, 1e-6  # CPU time of a sample, and of an entry of a tile's list
-
-
-def known_tiles(
-    setup: Setup,
-    tile_starts: NDArray[np.int64],
-    tile_entries: NDArray[np.int32],
-    active_tiles: NDArray[np.int32],
-    width: int,
-    height: int,
-    samples: int,
-    **_: Any,
-) -> Known:
-    """Length of the list of each active tile, and the area of the triangles in it; inputs of ``fine_raster``."""
-    E, entries = FineRasterEvent, np.diff(tile_starts)[active_tiles]
-    area = tile_areas(setup, tile_starts, tile_entries, width, height)[active_tiles]
-    segments, partial = -(-entries // SEGMENT), (entries % SEGMENT > 0).astype(np.int64)
-    listed: dict[int, NDArray[Any]] = {
-        E.SEGMENTS: segments,
-        E.LIST_WARPS: segments,
-        E.PARTIAL_SEGMENTS: partial,
-        E.ENTRY_LANES: entries,
-    }
-    seconds = SAMPLE_SECONDS * len(entries) * PIXELS * samples + ENTRY_SECONDS * int(entries.sum())
-    return Known(seconds, entries, (area,), listed)
 
 
 def fine_work(
@@ -61,7 +32,6 @@ def fine_work(
     samples: int,
     mode: str,
     words: int = 1,
-    **_: Any,
 ) -> Work:
     """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``.
 

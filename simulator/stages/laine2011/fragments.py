@@ -17,13 +17,12 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers, draw_of, fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers, Lists, draw_of, draw_rows, new_buffers
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE, WARP, Draw, FineRasterEvent, corner
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
-Lists = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]  # starts, entries, active tiles
 _LOW = 0xFFFFFFFF
 
 
@@ -120,7 +119,8 @@ def front(
 ) -> Front:
     """Run fine raster up to its ROP, release 1.1, one sample a pixel, mode blend; ``depth``: a ROP that reads it."""
     draw = draw_of(width, height, simt, release="1.1", mode="blend")
-    buffers, rows = fine_raster.run(setup, *lists, width, height, simt, release="1.1", mode="blend", colors=colors)
+    buffers = new_buffers(width, height)
+    rows = draw_rows(setup, lists, draw, colors, buffers)
     assert rows is not None  # noqa: S101 - it counts
     fragments = list_fragments(setup, *lists, rows[:, FineRasterEvent.FRAGMENT_LANES], colors, draw)
     if depth:
