@@ -23,6 +23,7 @@ from tilestamp.models.simt import Coalescing
 
 HALF_WARP_SEGMENTS = int(Coalescing.HALF_WARP_SEGMENTS)
 WARP_LINES = int(Coalescing.WARP_LINES)
+WARP_SECTORS = int(Coalescing.WARP_SECTORS)
 HALF_WARP = 16  # lanes
 SEGMENT_BYTES = 128  # largest transaction of 1.x, and a line of all later ones
 SECTOR_BYTES = 32  # smallest transaction of every rule
