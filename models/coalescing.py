@@ -18,11 +18,15 @@ lane is inactive**, and the number of lanes in use. All functions run inside sta
 
 from typing import Any
 
+import numpy as np
+
+from tilestamp.models.bits import active_lanes, lanes_near, lowest_bit
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing
 
 HALF_WARP_SEGMENTS = int(Coalescing.HALF_WARP_SEGMENTS)
 WARP_LINES = int(Coalescing.WARP_LINES)
+WARP_SECTORS = int(Coalescing.WARP_SECTORS)
 HALF_WARP = 16  # lanes
 SEGMENT_BYTES = 128  # largest transaction of 1.x, and a line of all later ones
 SECTOR_BYTES = 32  # smallest transaction of every rule
@@ -55,18 +59,21 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     -------
     count, bytes : int
     """
-    count = 0
-    total = 0
     request, segment = lanes, SECTOR_BYTES
-    if rule == HALF_WARP_SEGMENTS:
+    shrink = rule == HALF_WARP_SEGMENTS
+    if shrink:
         request, segment = HALF_WARP, min(SEGMENT_BYTES, SECTOR_BYTES * access_bytes)
     elif rule == WARP_LINES:
         segment = SEGMENT_BYTES
         if access_bytes > WORD_BYTES:
             request = max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
+    rising = 0 if shrink else _rising_segments(addresses, lanes, request, segment)
+    if rising > 0:
+        return rising, rising * segment
+    count = 0
+    total = 0
     for first in range(0, lanes, max(1, request)):
-        end = min(first + request, lanes)
-        n, b = _segments(addresses, first, end, access_bytes, segment, rule == HALF_WARP_SEGMENTS)
+        n, b = _segments(addresses, first, min(first + request, lanes), segment, shrink)
         count += n
         total += b
     return count, total
@@ -75,47 +82,43 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
 @kernel(lent=True)
 def touched_lines(addresses: Any, lanes: int) -> int:
     """Distinct lines of 128 bytes of one memory instruction; parameters as of ``transactions``."""
-    count: int = _segments(addresses, 0, lanes, WORD_BYTES, SEGMENT_BYTES, False)[0]
+    count: int = _segments(addresses, 0, lanes, SEGMENT_BYTES, False)[0]
     return count
 
 
 @kernel(lent=True)
-def _segments(
-    addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
-) -> tuple[int, int]:
+def _segments(addresses: Any, first: int, end: int, segment_bytes: int, shrink: bool) -> tuple[int, int]:
     """Distinct segments of the lanes first..end-1 and their bytes; ``shrink`` halves a segment that is half unused."""
-    rising = -1 if shrink else _rising_segments(addresses, first, end, segment_bytes)
-    if rising >= 0:
-        return rising, rising * segment_bytes
     count = 0
     total = 0
-    served = 0  # bit i: lane first + i
-    for i in range(first, end):
-        if addresses[i] < 0 or (served >> (i - first)) & 1:
-            continue
-        low = addresses[i]
-        high = low
-        for j in range(i + 1, end):
-            # two addresses are in one aligned segment when they differ only in the bits below its size;
-            # an inactive lane differs in the sign bit
-            if 0 <= (addresses[j] ^ addresses[i]) < segment_bytes:
-                served |= 1 << (j - first)
-                low = min(low, addresses[j])
-                high = max(high, addresses[j])
+    waiting = active_lanes(addresses, first, end)  # bit i: lane first + i
+    while waiting != np.uint64(0):
+        here = addresses[first + lowest_bit(waiting)]
+        together = lanes_near(addresses, first, end, here, segment_bytes)
+        waiting &= ~together
         count += 1
-        total += _shrunk(low, high + access_bytes, segment_bytes) if shrink else segment_bytes
+        size = segment_bytes
+        while shrink and size > SECTOR_BYTES and lanes_near(addresses, first, end, here, size >> 1) == together:
+            size >>= 1
+        total += size
     return count, total
 
 
 @kernel(lent=True)
-def _rising_segments(addresses: Any, first: int, end: int, segment_bytes: int) -> int:
-    """Distinct segments of lanes whose addresses never fall, as most do; -1 where one falls or a lane is inactive."""
-    falls = addresses[first] < 0
+def _rising_segments(addresses: Any, lanes: int, request: int, segment_bytes: int) -> int:
+    """Distinct segments of lanes whose addresses never fall, as most do; 0 where one falls or a lane is inactive.
+
+    A segment counts again in each ``request`` of so many lanes, a power of two where there are several.
+    """
+    if lanes == 0 or addresses[0] < 0:
+        return 0
+    falls = False
     count = 1
-    for i in range(first + 1, end):
+    apart = request - 1 if request < lanes else -1
+    for i in range(1, lanes):  # in several lanes at once
         falls |= addresses[i] < addresses[i - 1]
-        count += (addresses[i] ^ addresses[i - 1]) >= segment_bytes
-    return -1 if falls else count
+        count += ((addresses[i] ^ addresses[i - 1]) >= segment_bytes) | (i & apart == 0)
+    return 0 if falls else count
 
 
 @kernel(lent=True)

@@ -17,6 +17,7 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from tilestamp.models.atomics import CHUNK_BYTES
+from tilestamp.models.bits import active_lanes, popcount
 from tilestamp.models.coalescing import contiguous, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -93,7 +94,7 @@ def _count_atomic(
     tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, wanted: Any, row: Any, chunk_requests: Any, leaders: Any
 ) -> None:
     """Events of one slot in one warp."""
-    active = active_lanes(tile, lanes)
+    active = popcount(active_lanes(tile, 0, lanes))
     row[_E.SLOT_WARPS] += 1
     if active == 0:
         return
@@ -102,7 +103,7 @@ def _count_atomic(
     if aggregate:
         keep_leaders(tile, lanes, leaders)
         tile = leaders
-        active = active_lanes(tile, lanes)
+        active = popcount(active_lanes(tile, 0, lanes))
     counters, chunks, depth, group_depth, lock_depth = list_wanted(tile, lanes, rule.group, rule.padding, wanted)
     row[_E.ATOMIC] += 1
     row[_E.ATOMIC_LANES] += active
@@ -112,15 +113,6 @@ def _count_atomic(
     row[_E.GROUP_DEPTH] += group_depth
     row[_E.LOCK_DEPTH] += lock_depth
     row[_E.ATOMIC_SECTORS] += chunks
-
-
-@kernel(lent=True)
-def active_lanes(tile: Any, lanes: int) -> int:
-    """Lanes whose slot holds a tile."""
-    active = 0
-    for lane in range(lanes):
-        active += tile[lane] >= 0
-    return active
 
 
 @kernel(lent=True)

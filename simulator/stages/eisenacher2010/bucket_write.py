@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import active_lanes, popcount
 from tilestamp.models.coalescing import touched_lines, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -19,7 +20,6 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_count import (
     BLOCK,
     BOX_BYTES,
     WORD_BYTES,
-    active_lanes,
     patch_traffic,
 )
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
@@ -64,7 +64,7 @@ def _count_slot(
     tile: Any, first: int, lanes: int, slot: int, start: Any, idx: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:
     """Count loads of START and stores to LISTS of one slot in one warp, at their real addresses."""
-    active = active_lanes(tile, lanes)
+    active = popcount(active_lanes(tile, 0, lanes))
     row[_E.SLOT_WARPS] += 1
     if active == 0:
         return

@@ -101,7 +101,15 @@ def bin_raster(
     segment_bytes = transaction_bytes(simt, "bin_raster")
     bins_x, bins_y = -(-width // BIN_PIXELS), -(-height // BIN_PIXELS)
     given = BinInput(
-        setup.subtriangles, setup.headers, setup.misc, 8 * width, 8 * height, bins_x, bins_y, segment_bytes
+        setup.subtriangles,
+        setup.headers,
+        setup.misc,
+        8 * width,
+        8 * height,
+        bins_x,
+        bins_y,
+        segment_bytes,
+        segment_bytes.bit_length() - 1,
     )
     triangles = len(setup.subtriangles)
     batch = batch_size(triangles)

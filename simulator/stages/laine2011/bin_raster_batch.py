@@ -55,6 +55,7 @@ class BinInput(NamedTuple):
     bins_x: int
     bins_y: int
     segment_bytes: int  # of the machine's memory transactions
+    segment_log2: int
 
 
 class BinScratch(NamedTuple):
@@ -104,7 +105,7 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
         events[BinRasterEvent.ENTRIES] += write - start
         events[BinRasterEvent.OVERFLOWS] += go_on < last
         for start in range(first, last, WARP):  # a byte a lane
-            segments = (min(start + WARP, last) - 1) // given.segment_bytes - start // given.segment_bytes + 1
+            segments = ((min(start + WARP, last) - 1) >> given.segment_log2) - (start >> given.segment_log2) + 1
             count_load(events, 1, segments, segments * given.segment_bytes)
             count_visible(given.subtriangles[start : min(start + WARP, last)], events)
     return go_on, write
@@ -155,7 +156,7 @@ def _emit_warp(
                     if entries is not None:
                         entries[counts[b]] = scratch.ring[(first + lane) % RING]
                     if events is not None:
-                        mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES // given.segment_bytes)
+                        mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
                         stores += scratch.stamp[step, b] != mark
                         scratch.stamp[step, b] = mark
                     counts[b] += 1
@@ -212,7 +213,7 @@ def _count_warp(
     events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
     events[BinRasterEvent.SHARED_ATOMIC] += ors
     events[BinRasterEvent.BANK_REPLAYS] += replays
-    count_load(events, 1, *header_load(boxes.slot, lanes, given.segment_bytes))
+    count_load(events, 1, *header_load(boxes, lanes, given.segment_bytes))
 
 
 @kernel

@@ -96,7 +96,7 @@ def count_closing(given: Any, counts: Any, scratch: Any, events: Any) -> None:
         for b in range(first, min(first + WARP, counts.size)):
             if counts[b] % BIN_SEGMENT:
                 closing += 1
-                here = scratch.segment[b] * ENTRY_BYTES // given.segment_bytes
+                here = scratch.segment[b] * ENTRY_BYTES >> given.segment_log2
                 stores, last = stores + (here != last), here
         events[BinRasterEvent.CLOSING_WARPS] += closing > 0
         _count_store(events, stores, given.segment_bytes)

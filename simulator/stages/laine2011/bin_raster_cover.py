@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
+from tilestamp.models.coalescing import SECTOR_BYTES, WARP_LINES, WARP_SECTORS, smallest_transaction_bytes, transactions
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
@@ -29,7 +29,7 @@ class WarpBoxes(NamedTuple):
     box: NDArray[np.int64]  # (32, 4) first column, first row, columns, rows of squares
     edge: NDArray[np.int64]  # (32, 3) edge functions at the walk's square, largest over that closed square
     step: NDArray[np.int64]  # (32, 6) dx0 dy0 dx1 dy1 dx2 dy2 times the square's side
-    bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank in the current instruction
+    bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank, or addresses, of the current instruction
 
 
 @kernel
@@ -143,23 +143,13 @@ def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[i
 
 
 @kernel(lent=True)
-def header_load(slot: Any, lanes: int, segment_bytes: int) -> tuple[int, int]:
-    """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane.
-
-    The rule is that of ``models.coalescing``: distinct sectors of the warp, or distinct lines of each quarter-warp.
-    """
-    together = WARP if segment_bytes == SECTOR_BYTES else WARP // 4
-    distinct = 0
+def header_load(boxes: WarpBoxes, lanes: int, segment_bytes: int) -> tuple[int, int]:
+    """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane."""
     for lane in range(lanes):
-        here = slot[lane] * HEADER_BYTES // segment_bytes
-        new = True
-        for other in range(lane - 1, lane - lane % together - 1, -1):
-            there = slot[other] * HEADER_BYTES // segment_bytes
-            if there == here:  # slots mostly ascend, but runs of clipped triangles stand in between
-                new = False
-                break
-        distinct += new
-    return distinct, distinct * segment_bytes
+        boxes.bank[lane] = boxes.slot[lane] * HEADER_BYTES
+    rule = WARP_SECTORS if segment_bytes == SECTOR_BYTES else WARP_LINES
+    count, size = transactions(boxes.bank, lanes, HEADER_BYTES, rule)
+    return count, size
 
 
 def transaction_bytes(simt: Simt, stage: str) -> int:

@@ -149,6 +149,7 @@ def initial_capacity(triangles: int, width: int, height: int) -> int:
 
 
 def _input(queues: BinQueues, setup: Setup, width: int, height: int, simt: Simt) -> CoarseInput:
+    segment_bytes = transaction_bytes(simt, "coarse_raster")
     return CoarseInput(
         queues.starts,
         queues.entries,
@@ -160,7 +161,8 @@ def _input(queues: BinQueues, setup: Setup, width: int, height: int, simt: Simt)
         queues.bins_x,
         -(-width // TILE_PIXELS),
         -(-height // TILE_PIXELS),
-        transaction_bytes(simt, "coarse_raster"),
+        segment_bytes,
+        segment_bytes.bit_length() - 1,
     )
 
 

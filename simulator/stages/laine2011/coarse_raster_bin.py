@@ -51,6 +51,7 @@ class CoarseInput(NamedTuple):
     tiles_x: int
     tiles_y: int
     segment_bytes: int  # of the machine's memory transactions
+    segment_log2: int
 
 
 class Place(NamedTuple):
@@ -151,7 +152,7 @@ def _count_warp(
         ors, replays, _ = walk_votes(boxes, lanes, largest, BIN_TILES)
     events[CoarseRasterEvent.SHARED_ATOMIC] += ors
     events[CoarseRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *header_load(boxes.slot, lanes, given.segment_bytes))
+    _count_load(events, 1, *header_load(boxes, lanes, given.segment_bytes))
 
 
 @kernel(lent=True)
@@ -183,7 +184,7 @@ def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, event
             events[CoarseRasterEvent.LINK_WARPS] += linked > 0
             events[CoarseRasterEvent.FIRST_WARPS] += opened > 0
             events[CoarseRasterEvent.SCAN_WARPS] += most > 1
-            stores += linked - opened + (opened * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes
+            stores += linked - opened + ((opened * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)
             linked, opened, most = 0, 0, 0
         before[tile] = end
         touched += end > place
@@ -194,7 +195,7 @@ def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, event
         while place < end:  # the part of a tile's emits that one warp writes
             part = min(end - place, WARP - emits % WARP)
             first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
-            stores += last // given.segment_bytes - first // given.segment_bytes + 1
+            stores += (last >> given.segment_log2) - (first >> given.segment_log2) + 1
             place, emits = place + part, emits + part
     events[CoarseRasterEvent.TILES_TOUCHED] += touched
     events[CoarseRasterEvent.EMITS] += emits
@@ -202,7 +203,7 @@ def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, event
     events[CoarseRasterEvent.EMIT_WARPS] += (emits + WARP - 1) // WARP
     events[CoarseRasterEvent.EMIT_BLOCK_WARPS] += min((emits + WARP - 1) // WARP, BLOCK // WARP)
     events[CoarseRasterEvent.SEGMENT_WARPS] += (fresh + WARP - 1) // WARP
-    stores += 2 * ((fresh * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes)  # links and counts
+    stores += 2 * ((fresh * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)  # links and counts
     events[CoarseRasterEvent.SEGMENTS] += fresh
     events[CoarseRasterEvent.ALLOC_ROUNDS] += fresh > 0
     events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
@@ -220,7 +221,7 @@ def _count_tails(given: CoarseInput, counts: Any, tails: Any, events: Any) -> No
     for tile in range(TILES):
         if tile % WARP == 0:
             links, sizes = -1, -1
-        here, stores = tails[tile] * ENTRY_BYTES // given.segment_bytes, 0
+        here, stores = tails[tile] * ENTRY_BYTES >> given.segment_log2, 0
         if counts[tile] > 0:
             stores, links = int(here != links), here
         if counts[tile] % TILE_SEGMENT:
@@ -247,7 +248,7 @@ def _count_merge(given: CoarseInput, b: int, events: Any) -> None:
             warps = (size + WARP - 1) // WARP
             events[CoarseRasterEvent.MERGE_WARPS] += warps
             _count_load(events, 2, 2, 2 * given.segment_bytes)  # its count and the link to the next
-            segments = (size * ENTRY_BYTES + given.segment_bytes - 1) // given.segment_bytes
+            segments = (size * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2
             _count_load(events, warps, segments, segments * given.segment_bytes)
         read += min(BLOCK, write - read)
 

@@ -199,12 +199,10 @@ def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: N
     if packing == "64":
         words = np.full((height, width, 1), EMPTY, np.uint64)
         for_parts(_draw_strip, WORKERS, pieces, colors, words, None, tied)
-        frame = words[..., 0]
-        ids = (frame & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
-        ids[frame == EMPTY] = -1
-        return FreePipeFrame(
-            ids.astype(np.int32), (frame >> np.uint64(32)).astype(np.uint32), None, tied, np.zeros_like(tied)
-        )
+        payload, depth = words.view(np.uint32).reshape(height, width, 2).transpose(2, 0, 1)
+        ids = payload.view(np.int32) - np.int32(1)
+        ids[payload == EMPTY & 0xFFFFFFFF] = -1
+        return FreePipeFrame(ids, depth.copy(), None, tied, np.zeros_like(tied))
     wide = np.full((height, width, 2), EMPTY, np.uint64)
     halves = np.full((height, width, 2), 2**32 - 1, np.uint32)
     for_parts(_draw_strip, WORKERS, pieces, colors, wide, halves, tied)

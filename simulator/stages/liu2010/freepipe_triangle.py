@@ -112,80 +112,84 @@ def _pixels(a: int, b: int, c: int, bits: int, size: int) -> tuple[int, int]:
 
 
 @kernel(error_model="numpy", lent=True)
-def _piece(vertices: Any, width: int, height: int, bits: int, corner: Any, box: Any, depth: Any) -> int:
-    """Project and snap three clip positions, and find box and depth plane; returns which way it faces."""
+def _project(vertex: Any, width: int, height: int, bits: int, place: Any) -> Any:
+    """Project a clip position and snap it to ``place``, sub-pixels; returns its depth."""
     half = 1 << (bits - 1)
-    z = depth  # the place of the result serves for the corners' depths first
-    for k in range(3):
-        v = vertices[k]
-        r = _F1 / v[3]
-        corner[2 * k] = round_to_int32(v[0] * r * np.float32(half * width)) + half * width
-        corner[2 * k + 1] = round_to_int32(v[1] * r * np.float32(half * height)) + half * height
-        z[k] = v[2] * r
-    x0, y0, x1, y1, x2, y2 = corner[0], corner[1], corner[2], corner[3], corner[4], corner[5]
-    z0, z1, z2 = z[0], z[1], z[2]
+    r = _F1 / vertex[3]
+    place[0] = round_to_int32(vertex[0] * r * np.float32(half * width)) + half * width
+    place[1] = round_to_int32(vertex[1] * r * np.float32(half * height)) + half * height
+    return vertex[2] * r
+
+
+@kernel(error_model="numpy", lent=True)
+def _piece(places: Any, depths: Any, i: int, j: int, k: int, size: Any, bits: int, pieces: Any, p: int) -> None:
+    """Find box and depth plane of the triangle of three projected vertices, and which way it faces."""
+    half = 1 << (bits - 1)
+    corner, box, depth = pieces.corner[p], pieces.box[p], pieces.depth[p]
+    x0, y0, x1, y1, x2, y2 = places[i, 0], places[i, 1], places[j, 0], places[j, 1], places[k, 0], places[k, 1]
+    z0, z1, z2 = depths[i], depths[j], depths[k]
+    corner[0], corner[1], corner[2], corner[3], corner[4], corner[5] = x0, y0, x1, y1, x2, y2
+    depth[0], depth[1], depth[2] = z0, z1, z2
     area = (np.int64(x1) - x0) * (np.int64(y2) - y0) - (np.int64(y1) - y0) * (np.int64(x2) - x0)
     box[0], box[1], box[2], box[3] = 0, -1, 0, -1
+    pieces.facing[p] = (area > 0) - (area < 0)
     if area == 0:
-        return 0
-    facing = 1 if area > 0 else -1
+        return
     if area < 0:
         x1, y1, z1, x2, y2, z2 = x2, y2, z2, x1, y1, z1
         corner[2], corner[3], corner[4], corner[5] = x1, y1, x2, y2
         area = -area
-    box[0], box[1] = _pixels(x0, x1, x2, bits, width)
-    box[2], box[3] = _pixels(y0, y1, y2, bits, height)
+    box[0], box[1] = _pixels(x0, x1, x2, bits, size[0])
+    box[2], box[3] = _pixels(y0, y1, y2, bits, size[1])
     r = _F1 / np.float32(area)
     dx0, dy0, dx2, dy2 = np.float32(x1 - x0), np.float32(y1 - y0), np.float32(x0 - x2), np.float32(y0 - y2)
     slope_x = (-((z2 - z0) * dy0) + (z1 - z0) * -dy2) * r
     slope_y = ((z2 - z0) * dx0 + (z1 - z0) * dx2) * r
     to_x, to_y = np.float32((box[0] << bits) + half - x0), np.float32((box[2] << bits) + half - y0)
     depth[0], depth[1], depth[2] = z0 + slope_x * to_x + slope_y * to_y, slope_x, slope_y
-    return facing
 
 
 @kernel(lent=True)
-def _thread(
-    positions: Any,
-    triangles: Any,
-    t: int,
-    width: int,
-    height: int,
-    bits: int,
-    band: Any,
-    polygon: Any,
-    spare: Any,
-    fan: Any,
-    pieces: Any,
-) -> tuple[int, int]:
-    """Clip triangle t and count its pieces; write them where ``pieces`` is given."""
+def _fetch(positions: Any, triangles: Any, t: int, polygon: Any) -> None:
     for k in range(3):
         _copy(positions[triangles[t, k]], polygon[k])
-    kind, n = _classify(polygon, spare, band)
-    if pieces is not None:
-        for i in range(n):
-            for k in range(3):
-                _copy(polygon[i + k if k else 0], fan[k])
-            p = pieces.first[t] + i
-            pieces.facing[p] = _piece(fan, width, height, bits, pieces.corner[p], pieces.box[p], pieces.depth[p])
-    return kind, n
 
 
 @kernel
 def _classify_part(part: int, parts: int, positions: Any, triangles: Any, band: Any, kind: Any, count: Any) -> None:
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
     for t in range(kind.size * part // parts, kind.size * (part + 1) // parts):
-        kind[t], count[t] = _thread(positions, triangles, t, 1, 1, 4, band, polygon, spare, polygon, None)
+        _fetch(positions, triangles, t, polygon)
+        kind[t], count[t] = _classify(polygon, spare, band)
+
+
+@kernel(lent=True)
+def _vertex_part(part: int, parts: int, positions: Any, size: Any, bits: int, places: Any, depths: Any) -> None:
+    """Project the vertices once: those that are clipped away come out as anything."""
+    for v in range(depths.size * part // parts, depths.size * (part + 1) // parts):
+        depths[v] = _project(positions[v], size[0], size[1], bits, places[v])
 
 
 @kernel
-def _project_part(
-    part: int, parts: int, positions: Any, triangles: Any, width: int, height: int, bits: int, band: Any, pieces: Pieces
-) -> None:
+def _piece_part(
+    part: int, parts: int, positions: Any, triangles: Any, size: Any, bits: int, band: Any, places: Any, depths: Any,
+    pieces: Pieces,
+) -> None:  # fmt: skip
+    """Make the pieces of a share of the triangles; corners of clipped ones are projected here."""
     polygon, spare = np.empty((MAX_POLYGON, 4), np.float32), np.empty((MAX_POLYGON, 4), np.float32)
-    fan = np.empty((3, 4), np.float32)
+    own_places, own_depths = np.empty((MAX_POLYGON, 2), np.int32), np.empty(MAX_POLYGON, np.float32)
     for t in range(pieces.kind.size * part // parts, pieces.kind.size * (part + 1) // parts):
-        _thread(positions, triangles, t, width, height, bits, band, polygon, spare, fan, pieces)
+        p = pieces.first[t]
+        if pieces.kind[t] == INSIDE:
+            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            _piece(places, depths, np.int64(a), np.int64(b), np.int64(c), size, bits, pieces, p)
+        elif pieces.kind[t] == CLIPPED:
+            _fetch(positions, triangles, t, polygon)
+            n = _clip(polygon, spare, band)
+            for i in range(n):
+                own_depths[i] = _project(polygon[i], size[0], size[1], bits, own_places[i])
+            for i in range(n - 2):
+                _piece(own_places, own_depths, np.int64(0), i + 1, i + 2, size, bits, pieces, p + i)
 
 
 @kernel(lent=True)
@@ -244,7 +248,10 @@ def make_pieces(
     for_parts(_classify_part, parts, positions, triangles, band, kind, count)
     first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
     total = int(first[-1])
-    corner, box = np.zeros((total, 6), np.int32), np.zeros((total, 4), np.int32)
-    pieces = Pieces(kind, first, corner, box, np.zeros(total, np.int8), np.zeros((total, 3), np.float32))
-    for_parts(_project_part, parts, positions, triangles, width, height, bits, band, pieces)
+    corner, box = np.empty((total, 6), np.int32), np.empty((total, 4), np.int32)
+    pieces = Pieces(kind, first, corner, box, np.empty(total, np.int8), np.empty((total, 3), np.float32))
+    places, depths = np.empty((len(positions), 2), np.int32), np.empty(len(positions), np.float32)
+    size = width, height
+    for_parts(_vertex_part, parts_of(len(positions), _PART_TRIANGLES), positions, size, bits, places, depths)
+    for_parts(_piece_part, parts, positions, triangles, size, bits, band, places, depths, pieces)
     return pieces
