@@ -17,12 +17,12 @@ def test_fixed_lists_break_with_the_first_layer_too_many(method, room, front_fir
 
 
 def test_a_k_buffer_stands_for_any_layers_that_come_farthest_first():
-    assert bounded_layers.off(16, "k-buffer of 4", front_first=False) <= bounded_layers.ROUNDING
+    assert max(bounded_layers.off(layers, "k-buffer of 4", front_first=False) for layers in (5, 9, 16)) <= 1
 
 
 def test_a_k_buffer_has_its_k_layers_and_one_in_any_order():
     assert bounded_layers.off(5, "k-buffer of 4", front_first=True) <= 1
-    assert bounded_layers.off(10, "k-buffer of 4", front_first=True) > bounded_layers.ROUNDING
+    assert bounded_layers.off(7, "k-buffer of 4", front_first=True) > bounded_layers.ROUNDING
 
 
 def test_more_layers_of_a_k_buffer_are_less_off():
