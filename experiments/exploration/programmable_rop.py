@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 QUESTION = "What does a user's program in the ROP cost, and what do fragments of one pixel that meet in a warp?"
 MACHINES = ("gtx480", "h200")
-SIDE, LAYERS, LEGS = 512, 8, (2, 4, 8, 16)  # pixels, triangles at a place, pixels of a leg
+SIDE, LAYERS, LEGS = 384, 8, (2, 4, 8, 16)  # pixels, triangles at a place, pixels of a leg
 PROGRAMS = ("over", "additive", "nearest", "k-buffer", "stochastic")
 STAGE = "fine_raster"
 

@@ -9,9 +9,13 @@ from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
 
 
-@pytest.mark.parametrize("blend", ["over", "additive", "k-buffer", "stochastic"])
-def test_programs_1024x1024(benchmark, blend):
-    scene, options = confetti(1024, 20_000, 40.0), CudarasterOptions(mode="blend", blend=blend, cull_backfaces=False)
+@pytest.mark.parametrize(
+    "chosen",
+    [{"blend": name} for name in ("over", "additive", "k-buffer", "stochastic")] + [{"lists": "chunked"}],
+    ids=str,
+)
+def test_transparency_1024x1024(benchmark, chosen):
+    scene, options = confetti(1024, 20_000, 40.0), CudarasterOptions(mode="blend", cull_backfaces=False, **chosen)
 
     def draw():
         return cudaraster(scene, np.eye(4), 1024, 1024, Simt(), options, Executor())
