@@ -233,8 +233,8 @@ def alpha_test(
     buffers = new_buffers(width, height)
     lists = active_tiles, tile_starts, tile_entries
     work = fine_work(
-        _drawn(lists, setup, colors, draw, round(255 * reference), compact, buffers), setup, tile_entries, width, height,
-        simt, release="1.1", samples=1, mode="depth compacted" if compact else "depth tested",
+        _drawn(lists, setup, colors, draw, round(255 * reference), compact, buffers), setup, tile_entries, width,
+        height, simt, release="1.1", samples=1, mode="depth compacted" if compact else "depth tested",
         words=QUEUE_WORDS if compact else 1,
     )  # fmt: skip
     return StageResult(buffers, (replace(work, events=AlphaEvent),))
