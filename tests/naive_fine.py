@@ -51,18 +51,18 @@ class Job(NamedTuple):
         return [(k, *place) for k, (place, hit) in enumerate(zip(places, inside, strict=True)) if hit]
 
 
-def fine(job, starts, entries, active):
-    """Every event of the launch; ``starts`` and ``entries`` are the tiles' lists."""
+def fine(job, starts, entries, active, new_tile=None, warps=20):
+    """Every event of the launch of ``warps`` warps a block; ``starts`` and ``entries`` are the tiles' lists."""
     tally = Tally()
     size = smallest_transaction_bytes(int(job.simt.coalescing))
     columns = -(-job.width // 8)
     for t in map(int, active):
         listed = [int(e) for e in entries[starts[t] : starts[t + 1]]]
-        tally += _Tile(job, 8 * (t % columns), 8 * (t // columns), listed).draw()
+        tally += (new_tile or OneTile)(job, 8 * (t % columns), 8 * (t // columns), listed).draw()
         rows = (1 + (job.write_color or job.later_wins)) * 8 * job.samples  # of 32 bytes, that the clear writes
         tally += Counter(ATOMIC=1, TILE_STORES=1, STORE_TRANSACTIONS=rows, STORE_BYTES=32 * rows)
         tally += Counter(LOAD_TRANSACTIONS=2, LOAD_BYTES=2 * size)  # the tile's number and its first segment
-    warps = 20 * job.simt.sms  # each starts, and finds no tile at its last draw
+    warps *= job.simt.sms  # each starts, and finds no tile at its last draw
     loads = 3 * warps + tally["ATOMIC"] + warps  # and with each draw the number of tiles
     tally += Counter(WARP_STARTS=warps, ATOMIC=warps, LOAD_TRANSACTIONS=loads, LOAD_BYTES=loads * size)
     for name in ("ATOMIC_LANES", "ATOMIC_REQUESTS", "ATOMIC_DEPTH"):
@@ -70,7 +70,9 @@ def fine(job, starts, entries, active):
     return tally
 
 
-class _Tile:
+class OneTile:
+    """What a warp does for one tile."""
+
     def __init__(self, job, left, bottom, listed):
         self.job, self.tally, self.left, self.bottom, self.listed = job, Tally(), left, bottom, listed
         self.depths = {(x, y, k): FAR for x in range(8) for y in range(8) for k in range(job.samples)}
@@ -78,6 +80,7 @@ class _Tile:
         self.far, self.stale, self.fragments = FAR, False, []  # (slot, x, y), in order of slots and pixels
 
     def draw(self):
+        """All of the tile's list."""
         while True:
             if len(self.fragments) < WARP and self.listed:
                 if self.job.depth and self.stale:

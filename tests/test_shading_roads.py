@@ -2,10 +2,11 @@
 
 import pytest
 
-from tilestamp.experiments.exploration import derivatives, quad_merging
+from tilestamp.experiments.exploration import compaction, derivatives, quad_merging
 from tilestamp.experiments.harness.write import draw_figure
 
 SMALL = {
+    compaction: {"SIDE": 32, "LAYERS": (1, 4), "SHARES": (0.0, 0.75)},
     derivatives: {"TILTS": (0.0, 0.8, 0.95), "AREAS": (4.0, 100.0), "WIDTH": 48, "HEIGHT": 36},
     quad_merging: {
         "AREAS": (0.5, 10.0),

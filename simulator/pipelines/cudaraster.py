@@ -8,6 +8,7 @@ Modelled
 - All four kernels of both releases to the bit: queues, segments, input order, clipping, snapping, pictures,
   counters.
 - Batches, samples (1 to 8), four modes, and attempts that fail because a queue is too short (``first_frame``).
+- An alpha test, and its survivors compacted before they are shaded (``alpha_test``, ``compact``).
 - A program in the ROP (``blend``), a user's function too; lists of fragments that are blended by depth (``lists``).
 - What nvdiffrast's copy of the parameters to local memory costs (``copy_parameters``).
 
@@ -47,6 +48,7 @@ from tilestamp.simulator.pipelines._cudaraster_rop import draw_by, reads_depth
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
+from tilestamp.simulator.stages.laine2011.alpha_test import alpha_test
 from tilestamp.simulator.stages.laine2011.blend_programs import BUILT_IN, find_program
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
@@ -97,6 +99,10 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
     one for a round of 32 or one for a chunk; or a fixed number of places a pixel."""
     room: Annotated[int, Meta(ge=1, le=1024)] = 32
     """Nodes of a chunk, or fixed places of a pixel."""
+    alpha_test: Annotated[float, Meta(ge=0, le=1)] | None = None
+    """Mode depth: discard fragments whose alpha is below; none: no test."""
+    compact: bool = False
+    """After an alpha test, gather what is left in whole warps before it is shaded."""
     batches: Annotated[int, Meta(ge=1, le=1024)] = 1
     """Draws that the triangles are divided among; the first clears."""
     copy_parameters: bool = False
@@ -119,6 +125,9 @@ class CudarasterOptions(Options, frozen=True, kw_only=True):
             )
         if self.lists != "none" and self.blend != BUILT_IN[0]:
             raise TilestampError(f"lists {self.lists}: they are blended over, not by {self.blend}")
+        plain = self.release == "1.1" and self.mode == "depth" and self.msaa == self.batches == 1
+        if self.alpha_test is not None and not plain:
+            raise TilestampError("alpha_test: release 1.1 in mode depth, with msaa 1 and batches 1, alone has it")
         if self.copy_parameters and self.release != "nvdiffrast":
             raise TilestampError(f"copy_parameters: release {self.release} does not copy them; nvdiffrast does")
 
@@ -183,7 +192,9 @@ def cudaraster(
     """
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
-    shaded = options.programmable or (options.mode != "depth-only" and execute.picture)
+    shaded = (
+        options.programmable or options.alpha_test is not None or (options.mode != "depth-only" and execute.picture)
+    )
     colors = vertex_colors(mesh, matrix) if shaded else None
     state = _State(options, execute, (width, height), simt, colors)
     for first, last in _batch_bounds(len(mesh.triangles), options.batches):
@@ -257,6 +268,12 @@ def _draw_tiles(state: _State, setup: Setup, queues: TileQueues) -> tuple[FrameB
             blend=options.blend, layers=options.layers, lists=options.lists, room=options.room,
         )  # fmt: skip
         return buffers, works
+    if options.alpha_test is not None:
+        assert state.colors is not None  # noqa: S101 - made where there is an alpha test
+        return execute(
+            alpha_test, setup, queues.starts, queues.entries, queues.active, width, height, state.simt,
+            reference=options.alpha_test, compact=options.compact, colors=state.colors,
+        )[:2]  # fmt: skip
     return execute(
         fine_raster, setup, queues.starts, queues.entries, queues.active, width, height, state.simt,
         release=options.release, samples=options.msaa, mode=options.mode, colors=state.colors, buffers=state.buffers,

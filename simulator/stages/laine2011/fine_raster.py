@@ -54,7 +54,8 @@ class FrameBuffers(NamedTuple):
 
 
 @kernel(lent=True)
-def _load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+def load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+    """Clear a tile, or take its pixels from earlier draws."""
     tile.owner[:] = -1
     if draw.clear:
         tile.depth[:] = draw.clear_depth
@@ -75,7 +76,8 @@ def _load_layer(behind: Any, tile: Tile, x: int, y: int) -> None:
 
 
 @kernel(lent=True)
-def _store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+def store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
+    """Write what a tile has, shaded where its fragments are shaded late."""
     for sample in range(1 << draw.log_samples):
         for p in range(PIXELS):
             at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
@@ -92,7 +94,7 @@ def _store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile,
 
 
 @kernel(lent=True)
-def _count_tile(draw: Draw, row: Any) -> None:
+def count_tile(draw: Draw, row: Any) -> None:
     """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
 
     Surfaces are laid out in two dimensions, so that a row of a tile is one 32-byte segment on every machine. Samples
@@ -160,15 +162,15 @@ def _draw_tiles(
         t = active[a]
         left, bottom = corner(t, draw)
         x, y = (t % draw.tiles_x) * TILE, (t // draw.tiles_x) * TILE
-        _load_tile(buffers, draw, tile, x, y)
+        load_tile(buffers, draw, tile, x, y)
         if behind is not None:
             _load_layer(behind, tile, x, y)
         start_tile(tile, starts[t], starts[t + 1])
         row = row_of(table, a)
         draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
         if table is not None:
-            _count_tile(draw, row)
-        _store_tile(buffers, setup, colors, draw, tile, x, y)
+            count_tile(draw, row)
+        store_tile(buffers, setup, colors, draw, tile, x, y)
 
 
 @kernel(lent=True)

@@ -41,7 +41,7 @@ def count_reads(setup: Setup, draw: Draw, slots: Any, addresses: Any, n: int, pa
 
 
 @kernel(lent=True)
-def _fragment(
+def draw_fragment(
     setup: Setup, colors: Any, draw: Draw, tile: Tile, record: int, p: int, depth: int, x: int, y: int
 ) -> Any:
     """Depth test and write of one fragment, after all before it; True where it is written."""
@@ -89,7 +89,7 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
                 tile.pixel[kept] = slot
                 kept += passes
             n += 1
-            written = _fragment(setup, colors, draw, tile, record, p, depth, x, y)
+            written = draw_fragment(setup, colors, draw, tile, record, p, depth, x, y)
             if row is not None:
                 writes += written
                 tile.chain[p] += passes if draw.later_wins else written

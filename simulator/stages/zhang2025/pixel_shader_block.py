@@ -130,7 +130,7 @@ def texel_addresses(chains: Any, texture: int, method: int, lod: Any, uv: Any, l
 
 
 @kernel(lent=True)
-def count_warp(
+def count_shader_warp(
     lanes: int, textured: int, magnified: int, method: int, links: Any, pair: int, addresses: Any, rule: int,
     merge: int, row: Any,
 ) -> None:  # fmt: skip
@@ -181,4 +181,4 @@ def shade_block(
                 textured += 4
                 magnified += large
         if row is not None:
-            count_warp(4 * (end - warp), textured, magnified, method, links, pair, addresses, rule, merge, row)
+            count_shader_warp(4 * (end - warp), textured, magnified, method, links, pair, addresses, rule, merge, row)

@@ -15,7 +15,7 @@ from tilestamp.simulator.stages.zhang2025.pixel_shader_block import (
     MAGNIFIED,
     QUADS_A_WARP,
     TRILINEAR,
-    count_warp,
+    count_shader_warp,
     shade_pixel,
     texel_addresses,
 )
@@ -67,4 +67,4 @@ def shade_fragments(
                 texel_addresses(chains, texture, method, lod, uv, f - warp, addresses)
                 textured += 1
             shade_pixel(planes[p], chains, texture, method, opacity, x, y, lod, uv, colors[q, k])
-        count_warp(end - warp, textured, magnified, method, links, 1, addresses, rule, merge, row)
+        count_shader_warp(end - warp, textured, magnified, method, links, 1, addresses, rule, merge, row)
