@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from numba import njit
 
 from tests import naive_cudaraster as naive
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.laine2011.exact import (
     fma,
-    lowest_bit,
-    popcount,
     round_to_int32,
     round_to_uint32,
     truncate_to_uint32,
