@@ -60,7 +60,7 @@ class StochasticOptions(MotionInput, frozen=True, kw_only=True):
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """The raster has a thread a pixel of a tile, and the tile's samples in shared memory."""
         none = np.zeros((0, len(SampleRasterEvent)), np.int64)
-        return [raster_launch(none, self.tile, self.spp, double=self.double)]
+        return [raster_launch(none, self.tile, self.spp, "double" if self.double else "")]
 
 
 def stochastic(

@@ -22,13 +22,15 @@ from tilestamp.simulator.stages.fatahalian2009.motion import BlurPattern
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.stages.stochastic.tile_lists import ENTRY_BYTES, TRIANGLE_BYTES, MovingLists
-from tilestamp.simulator.stages.stochastic.triangles import MovingTriangles, covers, depth_of, seen_from
+from tilestamp.simulator.stages.stochastic.triangles import MovingTriangles, covers, depth_along, depth_of, seen_from
 from tilestamp.simulator.work import Work
 
 SAMPLE_BYTES = 20 + 8  # time and the sample's own x and y twice; depth and triangle
 PATTERN_BYTES = 16  # time, lens and place of a sample, as it is read
-TRIANGLE_LOADS = 6  # of 16 bytes, the same for all lanes: a segment each
+VECTOR_BYTES = 16  # of a load of the triangle, the same for all lanes: a segment each
+PLANES_BYTES = 48  # three normals and the volume, padded
 PIXEL_BYTES = 4
+FAILS = np.float32(-1.0)
 
 
 @shown(*SAMPLE_COUNTERS)
@@ -79,38 +81,64 @@ def sample_raster(
     events = np.zeros((len(lists.starts) - 1, len(SampleRasterEvent)), np.int64)
     for_parts(
         _sample_raster, parts_of(-(-samples.height // tile)), triangles.corners, aperture, focus, *lists, place,
-        pattern.time_lens.astype(kind), np.arange(max(samples.width, samples.height)).astype(kind), samples, tile,
-        simt.warp, events,
+        pattern.time_lens.astype(kind), np.arange(max(samples.width, samples.height)).astype(kind), None, None,
+        samples, tile, simt.warp, events,
     )  # fmt: skip
-    _add_traffic(events, simt, pattern.place.shape[2])
-    return StageResult(samples, (_work(events, triangles, lists, pattern, samples, tile),))
+    _add_traffic(events, simt, len(samples.offsets), TRIANGLE_BYTES)
+    table = PATTERN_BYTES * pattern.place.shape[0] ** 2 * len(samples.offsets)
+    variant = "double" if kind == np.float64 else ""
+    return StageResult(samples, (_work(events, lists, samples, tile, variant, TRIANGLE_BYTES, table),))
+
+
+def ray_raster(
+    normals: NDArray[Any], volumes: NDArray[Any], lists: MovingLists, rays: NDArray[np.float64], samples: Samples,
+    simt: Simt, *, tile: int,
+) -> StageResult[Samples]:  # fmt: skip
+    """Find the nearest triangle along each line of sight.
+
+    Parameters
+    ----------
+    normals, volumes
+        As in ``EdgePlanes``; tests are made in their precision.
+    lists, samples, simt, tile
+        As for ``sample_raster``.
+    rays : ndarray, (H, W, spp, 3), float64
+        Directions; not a number where nothing is seen.
+
+    Returns
+    -------
+    outputs : Samples
+        Depth is distance over 1 + distance.
+    works : one, a row a tile
+    """
+    events = np.zeros((len(lists.starts) - 1, len(SampleRasterEvent)), np.int64)
+    for_parts(
+        _sample_raster, parts_of(-(-samples.height // tile)), normals, 0, 0, *lists, None, None, None,
+        rays.astype(normals.dtype), volumes, samples, tile, simt.warp, events,
+    )  # fmt: skip
+    _add_traffic(events, simt, len(samples.offsets), PLANES_BYTES)
+    return StageResult(samples, (_work(events, lists, samples, tile, "rays", PLANES_BYTES, 0),))
 
 
 def _work(
-    events: NDArray[np.int64], triangles: MovingTriangles, lists: MovingLists, pattern: BlurPattern,
-    samples: Samples, tile: int,
+    events: NDArray[np.int64], lists: MovingLists, samples: Samples, tile: int, variant: str, triangle_bytes: int,
+    table: int,
 ) -> Work:  # fmt: skip
-    """The launch, with what its warps read and write."""
+    """The launch, with what its warps read and write; ``table``: bytes of the samples' pattern, 0 where it is computed."""
     entries, pixels, spp = len(lists.entries), samples.width * samples.height, len(samples.offsets)
-    drawn = TRIANGLE_BYTES * len(np.unique(lists.entries))
-    double = triangles.corners.dtype == np.float64
-    table = PATTERN_BYTES * pattern.place.shape[0] ** 2 * spp
-    return raster_launch(
-        events,
-        tile,
-        spp,
-        double=double,
-        streams=(
-            Stream("tile_lists", "load", 32 * entries, ENTRY_BYTES * entries),
-            Stream("triangles", "load", TRIANGLE_BYTES * entries, drawn),
-            Stream("pattern", "load", PATTERN_BYTES * pixels * spp, table),
-            Stream("image", "store", PIXEL_BYTES * pixels, PIXEL_BYTES * pixels),
-        ),
-    )
+    drawn = triangle_bytes * len(np.unique(lists.entries))
+    streams = [
+        Stream("tile_lists", "load", 32 * entries, ENTRY_BYTES * entries),
+        Stream("triangles", "load", triangle_bytes * entries, drawn),
+        Stream("image", "store", PIXEL_BYTES * pixels, PIXEL_BYTES * pixels),
+    ]
+    if table:
+        streams.append(Stream("pattern", "load", PATTERN_BYTES * pixels * spp, table))
+    return raster_launch(events, tile, spp, variant, tuple(streams))
 
 
 def raster_launch(
-    events: NDArray[np.int64], tile: int, spp: int, *, double: bool, streams: tuple[Stream, ...] = ()
+    events: NDArray[np.int64], tile: int, spp: int, variant: str, streams: tuple[Stream, ...] = ()
 ) -> Work:
     """A block a tile, a thread a pixel."""
     return Work(
@@ -122,16 +150,17 @@ def raster_launch(
         block=tile * tile,
         shared_bytes=tile * tile * spp * SAMPLE_BYTES,
         streams=streams,
-        variant="double" if double else "",
+        variant=variant,
     )
 
 
-def _add_traffic(events: NDArray[np.int64], simt: Simt, spp: int) -> None:
+def _add_traffic(events: NDArray[np.int64], simt: Simt, spp: int, triangle_bytes: int) -> None:
     """Lanes of a warp read the same words of an entry; of the pattern and the image they read and write their own."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
     warps = events[:, SampleRasterEvent.WARPS]
-    reads = events[:, SampleRasterEvent.ENTRY_WARPS] * (1 + TRIANGLE_LOADS)
-    reads += warps * spp * (PATTERN_BYTES * simt.warp // segment)
+    reads = events[:, SampleRasterEvent.ENTRY_WARPS] * (1 + triangle_bytes // VECTOR_BYTES)
+    if triangle_bytes == TRIANGLE_BYTES:  # lines of sight are computed
+        reads += warps * spp * (PATTERN_BYTES * simt.warp // segment)
     writes = warps * max(1, PIXEL_BYTES * simt.warp // segment)
     events[:, SampleRasterEvent.LOAD_TRANSACTIONS] = reads
     events[:, SampleRasterEvent.LOAD_BYTES] = reads * segment
@@ -142,7 +171,7 @@ def _add_traffic(events: NDArray[np.int64], simt: Simt, spp: int) -> None:
 @kernel
 def _sample_raster(
     part: int, parts: int, corners: Any, aperture: Any, focus: Any, starts: Any, entries: Any, masks: Any, place: Any,
-    time_lens: Any, whole: Any, samples: Samples, tile: int, warp: int, events: Any,
+    time_lens: Any, whole: Any, rays: Any, volumes: Any, samples: Samples, tile: int, warp: int, events: Any,
 ) -> None:  # fmt: skip
     """Draw a share of the rows of tiles."""
     rows, columns = (samples.height + tile - 1) // tile, (samples.width + tile - 1) // tile
@@ -165,32 +194,34 @@ def _sample_raster(
                     row[SampleRasterEvent.TEST_WARPS] += warps
                     row[SampleRasterEvent.SAMPLE_TESTS] += tile * tile
                     _test(
-                        corners, entries[at], aperture, focus, place, time_lens, whole, samples, tile, warp,
-                        i % columns * tile, i // columns * tile, s, scratch, row,
+                        corners, entries[at], aperture, focus, place, time_lens, whole, rays, volumes, samples, tile,
+                        warp, i % columns * tile, i // columns * tile, s, scratch, row,
                     )  # fmt: skip
 
 
 @kernel
 def _test(
-    corners: Any, p: int, aperture: Any, focus: Any, place: Any, time_lens: Any, whole: Any, samples: Samples,
-    tile: int, warp: int, x0: int, y0: int, s: int, scratch: Any, row: Any,
+    corners: Any, p: int, aperture: Any, focus: Any, place: Any, time_lens: Any, whole: Any, rays: Any, volumes: Any,
+    samples: Samples, tile: int, warp: int, x0: int, y0: int, s: int, scratch: Any, row: Any,
 ) -> None:  # fmt: skip
     """Test sample s of every pixel of a tile."""
     seen, weights, a, b, hits = scratch
     hits[:] = 0
     for y in range(y0, min(y0 + tile, samples.height)):
         for x in range(x0, min(x0 + tile, samples.width)):
-            i, j = y % place.shape[0], x % place.shape[0]
-            time = time_lens[i, j, s, 0]
-            for d in range(2):
-                shift = aperture * time_lens[i, j, s, 1 + d]
-                a[d] = shift - (whole[x if d == 0 else y] + place[i, j, s, d])
-                b[d] = shift * focus
             samples.tests[y, x] += 1
-            seen_from(corners, p, time, a, b, seen)
-            if not covers(seen, weights):
-                continue
-            depth = depth_of(corners, p, time, seen, weights)
+            depth = FAILS
+            if place is not None:
+                i, j = y % place.shape[0], x % place.shape[0]
+                for d in range(2):
+                    shift = aperture * time_lens[i, j, s, 1 + d]
+                    a[d] = shift - (whole[x if d == 0 else y] + place[i, j, s, d])
+                    b[d] = shift * focus
+                seen_from(corners, p, time_lens[i, j, s, 0], a, b, seen)
+                if covers(seen, weights):
+                    depth = depth_of(corners, p, time_lens[i, j, s, 0], seen, weights)
+            if rays is not None:
+                depth = depth_along(corners, volumes, p, rays[y, x, s], weights)
             if depth >= 0:
                 keep_nearest(samples, x, y, s, depth, p)
                 hits[((y - y0) * tile + x - x0) // warp] += 1

@@ -73,7 +73,9 @@ class MovingLists(NamedTuple):
     masks: NDArray[np.int64]
 
 
-def moving_lists(visits: Visits, tiles: int, simt: Simt) -> StageResult[MovingLists]:
+def moving_lists(
+    visits: Visits, tiles: int, simt: Simt, triangle_bytes: int = TRIANGLE_BYTES
+) -> StageResult[MovingLists]:
     """Make the lists from what the bounds found.
 
     Parameters
@@ -82,6 +84,8 @@ def moving_lists(visits: Visits, tiles: int, simt: Simt) -> StageResult[MovingLi
     tiles : int
         Of the screen.
     simt : Simt
+    triangle_bytes : int
+        Read of each.
 
     Returns
     -------
@@ -95,13 +99,13 @@ def moving_lists(visits: Visits, tiles: int, simt: Simt) -> StageResult[MovingLi
     starts = np.searchsorted(visits.tiles[order], np.arange(tiles + 1))
     table = np.zeros((max(1, -(-(len(visits.starts) - 1) // BLOCK)), len(MovingListEvent)), np.int64)
     requests = np.zeros(tiles * COUNTER_BYTES // 32 + 1, np.int64)
-    _count(*visits, starts.copy(), requests, simt, table)
+    _count(*visits, starts.copy(), requests, simt, triangle_bytes, table)
     lists = MovingLists(starts, triangles[order], visits.masks[order])
-    return StageResult(lists, _works(table, requests, len(visits.starts) - 1, tiles, simt))
+    return StageResult(lists, _works(table, requests, triangle_bytes * (len(visits.starts) - 1), tiles, simt))
 
 
 def _works(
-    table: NDArray[np.int64], requests: NDArray[np.int64], triangles: int, tiles: int, simt: Simt
+    table: NDArray[np.int64], requests: NDArray[np.int64], footprint: int, tiles: int, simt: Simt
 ) -> tuple[Work, ...]:
     loaded, stored, asked = (
         int(table[:, event].sum())
@@ -115,7 +119,7 @@ def _works(
         table=table,
         grid=len(table),
         block=BLOCK,
-        streams=(Stream("triangles", "load", loaded, TRIANGLE_BYTES * triangles), counters),
+        streams=(Stream("triangles", "load", loaded, footprint), counters),
         atomic_requests=requests,
     )
     counted = table.copy()
@@ -135,14 +139,14 @@ def _works(
 
 @kernel
 def _count(
-    starts: Any, tiles: Any, masks: Any, bounds: Any, next_place: Any, requests: Any, simt: Simt, table: Any
+    starts: Any, tiles: Any, masks: Any, bounds: Any, next_place: Any, requests: Any, simt: Simt, triangle_bytes: int, table: Any
 ) -> None:
     """Count what each warp of triangles does: lanes take the next tile of their boxes together."""
     counters, places = np.empty(simt.warp, np.int64), np.empty(simt.warp, np.int64)
     triangles = len(starts) - 1
     for first in range(0, triangles, simt.warp):
         row, last = table[first // BLOCK], min(first + simt.warp, triangles)
-        number, size = contiguous(first * TRIANGLE_BYTES, (last - first) * TRIANGLE_BYTES, simt.coalescing)
+        number, size = contiguous(first * triangle_bytes, (last - first) * triangle_bytes, simt.coalescing)
         row[MovingListEvent.WARPS] += 1
         row[MovingListEvent.WARP_LANES] += last - first
         row[MovingListEvent.LOAD_TRANSACTIONS] += number

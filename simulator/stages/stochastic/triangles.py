@@ -133,3 +133,24 @@ def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
     if (w > 0) != (total > 0) or w == 0 or abs(z) > abs(w):
         return np.float32(-1.0)
     return np.float32(0.5 + 0.5 * (z / w))
+
+
+@kernel
+def depth_along(normals: Any, volumes: Any, p: int, ray: Any, weights: Any) -> Any:
+    """Test a line of sight from the eye: distance over 1 + distance where it meets triangle p, -1 where it does not.
+
+    A line through an edge goes to the triangle that it would meet a little further along x; then along y; then along z.
+    """
+    for k in range(3):
+        weights[k] = normals[p, k, 0] * ray[0] + normals[p, k, 1] * ray[1] + normals[p, k, 2] * ray[2]
+    positive = weights[0] > 0 or weights[1] > 0 or weights[2] > 0
+    if positive == (weights[0] < 0 or weights[1] < 0 or weights[2] < 0) or (volumes[p] > 0) != positive:
+        return np.float32(-1.0)
+    for k in range(3):
+        if weights[k] == 0:
+            x, y, z = normals[p, k, 0], normals[p, k, 1], normals[p, k, 2]
+            first = x if x != 0 else y if y != 0 else z
+            if first == 0 or (first > 0) != positive:
+                return np.float32(-1.0)
+    distance = volumes[p] / (weights[0] + weights[1] + weights[2])
+    return np.float32(distance / (1 + distance)) if distance > 0 else np.float32(-1.0)
