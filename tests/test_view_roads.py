@@ -2,13 +2,14 @@
 
 import pytest
 
-from tilestamp.experiments.exploration import stochastic
+from tilestamp.experiments.exploration import nonlinear, stochastic
 from tilestamp.experiments.harness.write import draw_figure
 
 SMALL = {
     stochastic: {
         "EDGES": (8.0,), "WAYS": (0.0, 64.0), "CIRCLES": (4.0,), "SEEDS": range(100, 101), "WIDTH": 48, "HEIGHT": 36,
     },
+    nonlinear: {"SIDES": (1, 4), "TOLERANCES": (16.0, 0.25), "WIDTH": 48, "HEIGHT": 36},
 }  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Sampl
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.motion import BlurPattern
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
-from tilestamp.simulator.stages.nonlinear.bounds import edge_planes, visit_cones
+from tilestamp.simulator.stages.nonlinear.bounds import BIN, edge_planes, outlines, visit_bins, visit_cones
 from tilestamp.simulator.stages.nonlinear.projections import Kind, Projection, project, projection, rays
 from tilestamp.simulator.stages.nonlinear.tessellate import tessellate
 from tilestamp.simulator.stages.stochastic.bounds import EVERYTHING, visit_tiles
@@ -42,7 +42,9 @@ from tilestamp.simulator.stages.stochastic.tile_lists import moving_lists
 from tilestamp.simulator.stages.stochastic.triangles import Lens, moving_triangles, scene_triangles
 from tilestamp.simulator.work import Work
 
-REMARKS = {"torn": "{:,} triangles across the seam of the picture are not drawn: straight lines cannot go around it"}
+REMARKS = {
+    "torn": "{:,} small triangles on the seam of the picture, or a pole, are not drawn: lines cannot go around it"
+}
 CORNER_BYTES = 48  # three corners in eye space, padded
 
 
@@ -94,7 +96,13 @@ def nonlinear(
     small = Micropolygons(np.empty((len(whose), 3, 3), np.float32), made.patch[whose], made.shade[whose])
     frame = frame_of(samples, small, execute.works, torn=torn)
     return Frame(
-        frame.image, frame.depth, frame.works, frame.triangle_ids, frame.maps, frame.facts, remarks(REMARKS, frame.facts)
+        frame.image,
+        frame.depth,
+        frame.works,
+        frame.triangle_ids,
+        frame.maps,
+        frame.facts,
+        remarks(REMARKS, frame.facts),
     )
 
 
@@ -109,7 +117,7 @@ def eye_space(clip: NDArray[np.float64], matrix: NDArray[Any]) -> NDArray[np.flo
     scales = np.linalg.norm(np.asarray(matrix, float)[[0, 1, 3], :3], axis=1)
     if not scales[2] or np.array_equal(matrix, np.eye(4)):
         raise TilestampError("the pipeline nonlinear needs a perspective camera: lines of sight that meet in the eye")
-    return (clip[..., [0, 1, 3]] / scales).astype(np.float32)
+    return np.asarray(clip[..., [0, 1, 3]] / scales, np.float32)
 
 
 def sample_rays(to: Projection, samples: Samples) -> NDArray[np.float64]:
@@ -126,8 +134,12 @@ def _sight(
 ) -> None:  # fmt: skip
     """Draw by lines of sight."""
     planes = edge_planes(corners, double=options.double)
-    visits = visit_cones(planes, to, options.spp, options.tile)
-    lists, _, _ = execute(moving_lists, visits, _tiles(to, options.tile), simt, CORNER_BYTES)
+    found = outlines(planes)
+    bins, _, _ = execute(
+        moving_lists, visit_bins(found, to, options.tile), _tiles(to, options.tile * BIN), simt, CORNER_BYTES
+    )
+    visits, owners = visit_cones(found, bins, to, options.spp, options.tile)
+    lists, _, _ = execute(moving_lists, visits, _tiles(to, options.tile), simt, CORNER_BYTES, owners)
     light = sample_rays(to, samples)
     execute(ray_raster, planes.normals, planes.volumes, lists, light, samples, simt, tile=options.tile)
 

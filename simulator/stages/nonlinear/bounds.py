@@ -1,8 +1,9 @@
 """Tiles that a triangle may reach in a bent picture: cones against its edge planes, bins first (cone tests that hold).
 
-All lines of sight of a tile lie in a cone. It misses the triangle if it lies wholly beyond a plane through the eye and an
-edge, or apart from the cone about the corners (which holds the triangle, because a cone of less than a right angle is
-convex). A bin of 8x8 tiles is looked at first, and its tiles where it does not miss.
+All lines of sight of a tile lie in a cone. It misses the triangle if it lies wholly beyond a plane through the eye and
+an edge, or apart from the cone about the corners (which holds the triangle, because a cone of less than a right angle
+is convex). Bins of 8x8 tiles come first, each by the thread of its triangle; then the tiles of those that are not
+missed, a thread for each row of them: a triangle all around the eye would keep one thread at work for long.
 """
 
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.nonlinear.projections import Projection, cones
 from tilestamp.simulator.stages.stochastic.bounds import Visits
+from tilestamp.simulator.stages.stochastic.tile_lists import MovingLists
 
 BIN = 8  # tiles on a side
 MARGIN = 1e-5  # radians: covers the rounding of a test in float32
@@ -44,51 +46,67 @@ def edge_planes(corners: NDArray[np.float32], *, double: bool) -> EdgePlanes:
     return EdgePlanes(corners.astype(np.float64), normals, (normals[:, 0] * at[:, 0]).sum(axis=1))
 
 
-def visit_cones(planes: EdgePlanes, to: Projection, spp: int, tile: int) -> Visits:
-    """Bound each triangle; a bin that is looked at is a visit without a sample."""
-    tiles, bins = cones(to, tile), cones(to, tile * BIN)
-    columns, rows = -(-to.width // tile), -(-to.height // tile)
-    wide = -(-to.width // (tile * BIN))
-    lengths = np.linalg.norm(planes.corners, axis=2, keepdims=True)
-    with np.errstate(invalid="ignore", divide="ignore"):  # a corner at the eye bounds nothing
-        units = planes.corners / lengths
+class Outlines(NamedTuple):
+    """What is bounded of triangles: a cone about each, and unit normals of its edge planes that point inward."""
+
+    axes: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    inward: NDArray[np.float64]
+
+
+def outlines(planes: EdgePlanes) -> Outlines:
+    """Bound triangles; a corner at the eye gives what is not a number, and bounds nothing."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        units = planes.corners / np.linalg.norm(planes.corners, axis=2, keepdims=True)
         axes = units.sum(axis=1)
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         spread = np.arccos(np.clip((units * axes[:, None]).sum(axis=2), -1, 1)).max(axis=1)
         inward = planes.normals.astype(np.float64) * np.sign(planes.volumes)[:, None, None]
         inward /= np.linalg.norm(inward, axis=2, keepdims=True)
-    given = (axes, spread, inward, tiles, bins, columns, rows, wide)
-    counts = np.zeros(len(planes.volumes), np.int64)
-    none = np.empty(0, np.int32)
-    _visit(*given, counts, np.zeros(len(counts), np.int64), none, none.astype(np.int64), 0)
-    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    found, masks = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int64)
-    _visit(*given, counts, starts, found, masks, (1 << spp) - 1)
-    return Visits(starts, found, masks, np.ones(len(found), np.int64))
+    return Outlines(axes, spread, inward)
+
+
+def visit_bins(found: Outlines, to: Projection, tile: int) -> Visits:
+    """Look at every bin of each triangle: a thread a triangle."""
+    bins = cones(to, tile * BIN)
+    return _visits(found, np.arange(len(found.axes)), np.arange(len(bins))[None, None], bins, 1)
+
+
+def visit_cones(found: Outlines, bins: MovingLists, to: Projection, spp: int, tile: int) -> tuple[Visits, NDArray[Any]]:
+    """Look at the tiles of listed bins: a thread for each pair of triangle and bin and row of tiles in it.
+
+    Returns
+    -------
+    Visits
+    ndarray, (threads,), int64
+        Triangle of each thread.
+    """
+    columns, rows, wide = -(-to.width // tile), -(-to.height // tile), -(-to.width // (tile * BIN))
+    of = np.repeat(np.arange(len(bins.starts) - 1), np.diff(bins.starts))
+    i = of[:, None, None] % wide * BIN + np.arange(BIN)
+    j = of[:, None, None] // wide * BIN + np.arange(BIN)[:, None]
+    looked = np.where((i < columns) & (j < rows), j * columns + i, -1)
+    return _visits(found, bins.entries, looked, cones(to, tile), (1 << spp) - 1), np.repeat(bins.entries, BIN)
+
+
+def _visits(
+    found: Outlines, triangles: NDArray[Any], looked: NDArray[np.int64], squares: NDArray[np.float64], mask: int
+) -> Visits:
+    """Visits of squares (threads of a triangle, or one, their rows; -1: none), each thread a row."""
+    looked = np.broadcast_to(looked, (len(triangles), *looked.shape[1:]))
+    there = looked >= 0
+    starts = np.concatenate([[0], np.cumsum(there.sum(axis=2).ravel())]).astype(np.int64)
+    of = np.repeat(triangles, there.sum(axis=(1, 2))).astype(np.int64)
+    tiles = looked[there].astype(np.int32)
+    masks = np.empty(len(tiles), np.int64)
+    _look(*found, of, tiles, squares, mask, masks)
+    return Visits(starts, tiles, masks, np.ones(len(tiles), np.int64))
 
 
 @kernel
-def _visit(
-    axes: Any, spread: Any, inward: Any, tiles: Any, bins: Any, columns: int, rows: int, wide: int, counts: Any,
-    starts: Any, found: Any, masks: Any, mask: int,
-) -> None:  # fmt: skip
-    """Look at the bins, and at the tiles of those that a triangle may reach; counts alone while there is no mask."""
-    for p in range(len(axes)):
-        at = starts[p]
-        for b in range(len(bins)):
-            near = not misses(axes, spread, inward, p, bins[b])
-            if mask:
-                found[at], masks[at] = 0, 0
-            at += 1
-            if not near:
-                continue
-            for j in range(b // wide * BIN, min((b // wide + 1) * BIN, rows)):
-                for i in range(b % wide * BIN, min((b % wide + 1) * BIN, columns)):
-                    if mask:
-                        missed = misses(axes, spread, inward, p, tiles[j * columns + i])
-                        found[at], masks[at] = j * columns + i, 0 if missed else mask
-                    at += 1
-        counts[p] = at - starts[p]
+def _look(axes: Any, spread: Any, inward: Any, of: Any, tiles: Any, squares: Any, mask: int, masks: Any) -> None:
+    for at in range(len(of)):
+        masks[at] = 0 if misses(axes, spread, inward, of[at], squares[tiles[at]]) else mask
 
 
 @kernel

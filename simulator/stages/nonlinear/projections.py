@@ -1,7 +1,7 @@
 """Fisheye, paraboloid and cylinder: the line of sight of a sample, its inverse, and how far sight turns a pixel.
 
-Eye space: x to the right, y up, z ahead. All of them see more than a half space; ``fov`` is the angle across the width of
-the picture.
+Eye space: x to the right, y up, z ahead. All of them see more than a half space; ``fov`` is the angle across the width
+of the picture.
 
 fisheye      equidistant: the angle from the axis is the distance from the middle, over f; 360 degrees are a disc
 paraboloid   (x, y) / (1 + z) of the unit direction: a stereographic image, up to less than 360 degrees
@@ -56,10 +56,10 @@ def rays(to: Projection, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
     radius = np.hypot(p, q)
     if to.kind == "paraboloid":
         square = radius**2
-        return np.stack([2 * p, 2 * q, 1 - square], axis=-1) / (1 + square)[..., None]
+        return np.asarray(np.stack([2 * p, 2 * q, 1 - square], axis=-1) / (1 + square)[..., None], np.float64)
     aside = np.sinc(radius / np.pi)
-    seen = np.where(radius <= np.pi, 1.0, np.nan)
-    return np.stack([p * aside, q * aside, np.cos(radius)], axis=-1) * seen[..., None]
+    directions = np.stack([p * aside, q * aside, np.cos(radius)], axis=-1)
+    return np.where(radius[..., None] <= np.pi, directions, np.nan)
 
 
 def project(to: Projection, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -74,14 +74,14 @@ def project(to: Projection, points: NDArray[np.float64]) -> NDArray[np.float64]:
     else:
         scale = np.arctan2(side, z) / np.maximum(side, 1e-300)
         p, q = x * scale, y * scale
-    return np.stack([to.width / 2 + p * to.focal, to.height / 2 - q * to.focal], axis=-1)
+    return np.asarray(np.stack([to.width / 2 + p * to.focal, to.height / 2 - q * to.focal], axis=-1), np.float64)
 
 
 def cones(to: Projection, size: int) -> NDArray[np.float64]:
-    """Cones that hold the lines of sight of each square of ``size`` pixels, row by row, (squares, 4): axis and half angle.
+    """Cones that hold the lines of sight of squares of ``size`` pixels, row by row, (squares, 4): axis and half angle.
 
-    A direction turns by at most 1 / focal a pixel: the equidistant map does not stretch (the sphere is curved), nor does
-    the cylinder; a stereographic one turns by 2 / (1 + r^2) a unit, most where the square is nearest to the middle.
+    A direction turns by at most 1 / focal a pixel: the equidistant map does not stretch (the sphere is curved), nor
+    does the cylinder; a stereographic one turns by 2 / (1 + r^2) a unit, most where a square is nearest to the middle.
     """
     rows, columns = -(-to.height // size), -(-to.width // size)
     y, x = (np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")) + 0.5) * size
@@ -89,7 +89,8 @@ def cones(to: Projection, size: int) -> NDArray[np.float64]:
     turn = np.full(x.shape, 1.0 / to.focal)
     axis = rays(to, x, y)
     if to.kind == "paraboloid":
-        nearest = np.hypot(*(np.maximum(np.abs(at - middle / 2) - size / 2, 0) for at, middle in ((x, to.width), (y, to.height))))
+        aside, above = (np.maximum(np.abs(at - all_ / 2) - size / 2, 0) for at, all_ in ((x, to.width), (y, to.height)))
+        nearest = np.hypot(aside, above)
         turn *= 2.0 / (1.0 + (nearest / to.focal) ** 2)
     elif to.kind == "fisheye":  # a square whose middle sees nothing may have a corner that does
         away = np.isnan(axis[..., 0])

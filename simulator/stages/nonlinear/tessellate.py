@@ -16,7 +16,7 @@ from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 LEVELS = 8  # halvings at most
 BLOCK = 128  # threads; each has a triangle of one level
 CORNER = 12  # bytes
-# by the edges that are halved (bit k: the edge from corner k to the next): corners of the parts, 3 to 5 being the middles
+# by the edges that are halved (bit k: from corner k to the next): corners of the parts, 3 to 5 being the middles
 PARTS: dict[int, list[tuple[int, int, int]]] = {
     0: [(0, 1, 2)],
     1: [(0, 3, 2), (3, 1, 2)],
@@ -43,9 +43,7 @@ class Tessellated(NamedTuple):
     parents: NDArray[np.int64]
 
 
-def tessellate(
-    corners: NDArray[np.float64], to: Projection, tolerance: float, simt: Simt
-) -> StageResult[Tessellated]:
+def tessellate(corners: NDArray[np.float64], to: Projection, tolerance: float, simt: Simt) -> StageResult[Tessellated]:
     """Halve edges of triangles (M, 3, 3) until their middles lie within ``tolerance`` pixels of the chord.
 
     Returns
@@ -53,7 +51,7 @@ def tessellate(
     outputs : Tessellated
     works : one for each level, a thread a triangle
     facts : dict
-        ``torn``: triangles left out because they still lie on both sides of the picture's seam at the last level.
+        ``torn``: triangles left out because they are still bent at the last level: on the picture's seam, or a pole.
     """
     parents, works = np.arange(len(corners)), []
     halves = _halves(corners, to, tolerance)
@@ -68,8 +66,7 @@ def tessellate(
         corners = np.concatenate([part.reshape(-1, 3, 3) for part, _ in made])
         parents = np.concatenate([np.repeat(whose, n) for (_, whose), n in zip(made, counts, strict=True)])
         halves = _halves(corners, to, tolerance)
-    places = project(to, corners)
-    torn = np.ptp(places, axis=1).max(axis=1) > to.focal  # a radian across: its other end lies beyond the seam
+    torn = halves > 0
     return StageResult(Tessellated(corners[~torn], parents[~torn]), tuple(works), {"torn": int(torn.sum())})
 
 
@@ -78,4 +75,4 @@ def _halves(corners: NDArray[np.float64], to: Projection, tolerance: float) -> N
     after = np.roll(corners, -1, axis=1)
     chord = (project(to, corners) + project(to, after)) / 2
     off = np.linalg.norm(project(to, (corners + after) / 2) - chord, axis=2) > tolerance
-    return off @ np.array([1, 2, 4])
+    return np.asarray(off @ np.array([1, 2, 4]), np.int64)

@@ -124,7 +124,7 @@ def _work(
     events: NDArray[np.int64], lists: MovingLists, samples: Samples, tile: int, variant: str, triangle_bytes: int,
     table: int,
 ) -> Work:  # fmt: skip
-    """The launch, with what its warps read and write; ``table``: bytes of the samples' pattern, 0 where it is computed."""
+    """The launch, with what its warps read and write; ``table``: bytes of the samples' pattern, if it is read."""
     entries, pixels, spp = len(lists.entries), samples.width * samples.height, len(samples.offsets)
     drawn = triangle_bytes * len(np.unique(lists.entries))
     streams = [

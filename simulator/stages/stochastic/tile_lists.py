@@ -74,7 +74,11 @@ class MovingLists(NamedTuple):
 
 
 def moving_lists(
-    visits: Visits, tiles: int, simt: Simt, triangle_bytes: int = TRIANGLE_BYTES
+    visits: Visits,
+    tiles: int,
+    simt: Simt,
+    triangle_bytes: int = TRIANGLE_BYTES,
+    owners: NDArray[Any] | None = None,
 ) -> StageResult[MovingLists]:
     """Make the lists from what the bounds found.
 
@@ -85,7 +89,9 @@ def moving_lists(
         Of the screen.
     simt : Simt
     triangle_bytes : int
-        Read of each.
+        Read by each thread.
+    owners : ndarray, (threads,), optional
+        Triangle of each thread; none: its own number.
 
     Returns
     -------
@@ -95,7 +101,8 @@ def moving_lists(
     simt = Simt(*map(int, simt))
     listed = np.flatnonzero(visits.masks)
     order = listed[np.argsort(visits.tiles[listed], kind="stable")]
-    triangles = np.repeat(np.arange(len(visits.starts) - 1, dtype=np.int32), np.diff(visits.starts))
+    of = np.arange(len(visits.starts) - 1) if owners is None else owners
+    triangles = np.repeat(of.astype(np.int32), np.diff(visits.starts))
     starts = np.searchsorted(visits.tiles[order], np.arange(tiles + 1))
     table = np.zeros((max(1, -(-(len(visits.starts) - 1) // BLOCK)), len(MovingListEvent)), np.int64)
     requests = np.zeros(tiles * COUNTER_BYTES // 32 + 1, np.int64)
@@ -139,7 +146,15 @@ def _works(
 
 @kernel
 def _count(
-    starts: Any, tiles: Any, masks: Any, bounds: Any, next_place: Any, requests: Any, simt: Simt, triangle_bytes: int, table: Any
+    starts: Any,
+    tiles: Any,
+    masks: Any,
+    bounds: Any,
+    next_place: Any,
+    requests: Any,
+    simt: Simt,
+    triangle_bytes: int,
+    table: Any,
 ) -> None:
     """Count what each warp of triangles does: lanes take the next tile of their boxes together."""
     counters, places = np.empty(simt.warp, np.int64), np.empty(simt.warp, np.int64)
