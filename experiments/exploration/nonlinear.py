@@ -118,8 +118,8 @@ def _answer(table: "pd.DataFrame") -> str:
         ratio.min().index, ratio.min(), ratio.max(), strict=True))  # fmt: skip
     return (
         f"Time of tessellation within {min(TOLERANCES):g} pixel over that of lines of sight, over the projections:"
-        f" {said}; it shows {100 * finest.wrong.min():.2g} to {100 * finest.wrong.max():.2g} % of the pixels wrong, lines"
-        f" of sight in float32 at most {100 * sight.wrong.max():.2g} %."
+        f" {said}; it shows {100 * finest.wrong.min():.2g} to {100 * finest.wrong.max():.2g} % of the pixels wrong,"
+        f" lines of sight in float32 at most {100 * sight.wrong.max():.2g} %."
     )
 
 
