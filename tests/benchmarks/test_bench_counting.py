@@ -2,19 +2,19 @@
 
 import pytest
 
+from tests.drawable import seen
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_names, pipeline_options
-from tilestamp.simulator.scenes import load_scene, read_camera
 
 SIZE = 800, 600
 
 
 @pytest.mark.parametrize("counting", [True, False])
 @pytest.mark.parametrize("pipeline", pipeline_names())
-def test_a_teapot(benchmark, timed, pipeline, counting):
-    scene, size = load_scene("teapot"), SIZE if timed else (64, 48)
-    matrix, simt = read_camera("default", scene).matrix(*size), load_machine("h200").simt
+def test_a_frame(benchmark, timed, pipeline, counting):
+    size, simt = SIZE if timed else (64, 48), load_machine("h200").simt
+    scene, matrix = seen(pipeline, *size)
     draw, options = load_pipeline(pipeline), pipeline_options(pipeline, {})
 
     def frame():

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from tests.drawable import scene_for
 from tilestamp.simulator.pipelines import pipeline_names
 
 RENDER = "render", "teapot"
@@ -47,4 +48,4 @@ def test_the_first_picture_from_an_empty_cache(benchmark, empty):
 def test_a_further_pipeline_from_the_cache_of_another(benchmark, empty, of_another, pipeline):
     folder = empty()
     shutil.copytree(of_another, folder["NUMBA_CACHE_DIR"], dirs_exist_ok=True)
-    assert benchmark.pedantic(command, (*RENDER, "--pipeline", pipeline), folder, rounds=1)
+    assert benchmark.pedantic(command, ("render", scene_for(pipeline), "--pipeline", pipeline), folder, rounds=1)
