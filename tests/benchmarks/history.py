@@ -1,7 +1,8 @@
 """The history of the benchmarks: ``python -m tests.benchmarks.history [pytest's arguments]`` adds a run and plots all.
 
-A run is a line for each benchmark in ``history.csv``: the day, the commit, the median in milliseconds, and its ratio to
-the yardstick's of the same run. Computers are noisy and unlike: compare ratios.
+A run is a line for each benchmark in ``history.csv`` (which git ignores; ``history.png`` shows it): the day, the commit,
+the median in milliseconds, its ratio to the yardstick's of the same run, and what else the benchmark noted, such as the
+peak of memory. Computers are noisy and unlike: compare ratios.
 """
 
 import json
@@ -35,11 +36,12 @@ def main() -> None:
 def run_rows(report: dict, commit: str, day: str) -> pd.DataFrame:
     """Lines of the history from one report of pytest-benchmark."""
     medians = {made["name"]: made["stats"]["median"] for made in report["benchmarks"]}
-    rule = medians.pop(YARDSTICK)
+    noted = {made["name"]: json.dumps(made["extra_info"]) for made in report["benchmarks"] if made.get("extra_info")}
+    rule, about = medians.pop(YARDSTICK), {"day": day, "commit": commit}
     return pd.DataFrame(
         [
-            {"day": day, "commit": commit, "benchmark": name, "ms": round(1e3 * median, 3), "ratio": median / rule}
-            for name, median in medians.items()
+            {**about, "benchmark": name, "ms": round(1e3 * s, 3), "ratio": s / rule, "noted": noted.get(name, "")}
+            for name, s in medians.items()
         ]
     )
 

@@ -1,16 +1,17 @@
-"""Speed beside rasterizers that count nothing: ``python -m tests.benchmarks.peers [MILLION ...] [--plot PICTURE]``.
+"""Speed beside rasterizers that count nothing: ``python -m tests.benchmarks.peers [MILLION ...] [--growth PICTURE]``.
 
 llvmpipe (Mesa's software OpenGL, through moderngl and EGL: Debian's libegl-mesa0 and libgl1-mesa-dri), datashader, and
 a plain scan in Numba draw what cudaraster draws, by turns in one process. Absolute times say little on a shared
 computer, so each row shows the least of all turns, as a ratio to llvmpipe's. Buffers of the peers are filled before the
-clock starts, and no picture is read back.
+clock starts, and no picture is read back. The killeroo (2.4 M quads through micropolygon) is drawn beside 4.8 M
+triangles of llvmpipe, where it is on the scene path.
 """
 
 import argparse
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,37 +19,61 @@ import pandas as pd
 
 from tests.benchmarks.test_bench_cudaraster import sphere, waves
 from tilestamp.models.kernel import kernel
+from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
+from tilestamp.simulator.pipelines.micropolygon import MicropolygonOptions, micropolygon
+from tilestamp.simulator.scenes import load_scene, read_camera
 from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES
 
 WIDTH, HEIGHT = 1600, 1200
 MILLIONS = (0.01, 0.1, 1.0, 4.8)
 GROWTH = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 20.0)
 MOST_OF_DATASHADER = 5  # million triangles: it copies them into a data frame
+KILLEROO = 4_800_000  # triangles: two a quad
 COUNTED, UNCOUNTED, PIPE = "all counters", "no counters", "llvmpipe"
+PEERS = (PIPE, "datashader", "plain scan")
 Draw = Callable[[], Any]
 
 
 def main() -> None:
-    """Time all peers on spheres and waves, print the ratios, and plot the growth where asked for."""
+    """Time all peers on spheres and waves, and the killeroo; print the ratios; plot the growth where asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("millions", type=float, nargs="*", help="triangles, million")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--plot", help="draw the growth from 10 k to 20 M triangles into this file")
+    parser.add_argument("--growth", help="draw the growth from 10 k to 20 M triangles into this file")
     chosen = parser.parse_args()
-    millions = chosen.millions or (GROWTH if chosen.plot else MILLIONS)
+    millions = chosen.millions or (GROWTH if chosen.growth else MILLIONS)
     rows = []
     for name, scene_of in (("sphere", sphere), ("waves", waves)):
         for million in millions:
             scene = scene_of(million * 1e6)
-            times = least_times(drawers(scene), chosen.rounds)
-            rows += [{"scene": name, "triangles": len(scene.mesh.triangles), "peer": p} | t for p, t in times.items()]
-            sys.stdout.write(shown(rows[-len(times) :]))
-            sys.stdout.flush()
-    if chosen.plot:
-        plot(pd.DataFrame(rows), chosen.plot)
+            rows += timed(name, len(scene.mesh.triangles), drawers(scene), chosen.rounds)
+    if chosen.growth:
+        plot(pd.DataFrame(rows), chosen.growth)
+    elif not chosen.millions:
+        timed("killeroo", KILLEROO, killeroo(), chosen.rounds)
+
+
+def timed(scene: str, triangles: int, draws: dict[str, Draw], rounds: int) -> list[dict[str, Any]]:
+    """Time one scene and print its lines."""
+    times = least_times(draws, rounds)
+    rows = [{"scene": scene, "triangles": triangles, "peer": peer} | found for peer, found in times.items()]
+    sys.stdout.write(shown(rows))
+    sys.stdout.flush()
+    return rows
+
+
+def killeroo() -> dict[str, Draw]:
+    """Draw the killeroo's micropolygons, and beside them as many triangles as two a quad make."""
+    scene, view = load_scene("killeroo"), (WIDTH, HEIGHT)
+    matrix, simt = read_camera("default", scene).matrix(*view), load_machine("gtx280").simt
+
+    def ours(*, counting: bool) -> Draw:
+        return lambda: micropolygon(scene, matrix, *view, simt, MicropolygonOptions(), Executor(counting=counting))
+
+    return {COUNTED: ours(counting=True), UNCOUNTED: ours(counting=False)} | peers(sphere(KILLEROO), (PIPE,))
 
 
 def drawers(scene: Any) -> dict[str, Draw]:
@@ -58,10 +83,16 @@ def drawers(scene: Any) -> dict[str, Draw]:
     def ours(*, counting: bool) -> Draw:
         return lambda: cudaraster(scene, np.eye(4), WIDTH, HEIGHT, Simt(), options, Executor(counting=counting))
 
-    found: dict[str, Draw] = {COUNTED: ours(counting=True), UNCOUNTED: ours(counting=False)}
-    for name, make in ((PIPE, llvmpipe), ("datashader", datashader), ("plain scan", plain_scan)):
+    return {COUNTED: ours(counting=True), UNCOUNTED: ours(counting=False)} | peers(scene, PEERS)
+
+
+def peers(scene: Any, names: Iterable[str]) -> dict[str, Draw]:
+    """Draw the scene by peers, those that are installed."""
+    makers = dict(zip(PEERS, (llvmpipe, datashader, plain_scan), strict=True))
+    found: dict[str, Draw] = {}
+    for name in names:
         try:
-            found[name] = make(scene.mesh)
+            found[name] = makers[name](scene.mesh)
         except (ImportError, ValueError) as error:
             sys.stdout.write(f"without {name}: {error}\n")
     return found

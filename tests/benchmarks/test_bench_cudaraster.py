@@ -1,4 +1,7 @@
-"""Cudaraster on a sphere: four stages with every counter, and the growth from ten thousand to a million triangles."""
+"""A sphere through cudaraster and freepipe, with every counter and without: time by size, setup alone, memory."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -6,7 +9,9 @@ import pytest
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines.cudaraster import CudarasterOptions, cudaraster
+from tilestamp.simulator.pipelines.freepipe import FreepipeOptions, freepipe
 from tilestamp.simulator.scenes.scene import Mesh, Scene
+from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 
 
 def sphere(triangles):
@@ -32,12 +37,48 @@ def _surface(name, n, axes):
 
 
 @pytest.mark.parametrize("counting", [True, False])
-@pytest.mark.parametrize("triangles", [10_000, 100_000, 1_000_000])
-def test_cudaraster_1600x1200(benchmark, triangles, counting):
-    scene = sphere(triangles)
+@pytest.mark.parametrize("triangles", [10_000, 100_000, 1_000_000, 4_800_000])
+def test_cudaraster_1600x1200(benchmark, scaled, triangles, counting):
+    scene = sphere(scaled(triangles))
 
     def draw():
         return cudaraster(scene, np.eye(4), 1600, 1200, Simt(), CudarasterOptions(), Executor(counting=counting))
 
     frame = benchmark.pedantic(draw, rounds=3, warmup_rounds=1)
     assert (frame.triangle_ids >= 0).sum() > 900_000
+
+
+@pytest.mark.parametrize("counting", [True, False])
+def test_triangle_setup_of_a_million(benchmark, scaled, counting):
+    mesh = sphere(scaled(1_000_000)).mesh
+    given = {"release": "1.1", "counting": counting}
+    found = benchmark.pedantic(
+        triangle_setup, (mesh.positions, mesh.triangles, 1600, 1200, Simt()), given, rounds=5, warmup_rounds=1
+    )
+    assert found.outputs.subtriangles.any()
+
+
+@pytest.mark.parametrize("counting", [True, False])
+def test_freepipe_1600x1200(benchmark, scaled, counting):
+    scene = sphere(scaled(1_000_000))
+
+    def draw():
+        return freepipe(scene, np.eye(4), 1600, 1200, Simt(), FreepipeOptions(), Executor(counting=counting))
+
+    frame = benchmark.pedantic(draw, rounds=3, warmup_rounds=1)
+    assert (frame.triangle_ids >= 0).sum() > 900_000
+
+
+def test_memory_of_five_million_triangles(benchmark, scaled):
+    """Peak of a process, in ``extra_info``: of the benchmarks before it nothing is in it."""
+    program = (
+        "import resource, numpy as np; from tests.benchmarks.test_bench_cudaraster import *; "
+        f"scene = sphere({scaled(5_000_000)}); before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; "
+        "cudaraster(scene, np.eye(4), 1600, 1200, Simt(), CudarasterOptions(), Executor()); "
+        "print(before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    command = [sys.executable, "-c", program]
+    done = benchmark.pedantic(subprocess.run, (command,), {"capture_output": True, "check": True}, rounds=1)
+    with_scene, peak = (int(word) / 1024 for word in done.stdout.split())
+    benchmark.extra_info.update(scene_mb=with_scene, peak_mb=peak)
+    assert peak >= with_scene

@@ -15,7 +15,7 @@ ROADS = [
 
 
 @pytest.mark.parametrize(
-    "options", ROADS, ids=lambda options: ",".join(f"{k}={v!s:.4}" for k, v in options.items()) or "published"
+    "options", ROADS, ids=lambda options: ",".join(f"{k}={v}" for k, v in options.items()) or "published"
 )
 def test_micropolygons_another_way(benchmark, options):
     frame = {"machine": "h200", "width": 800, "height": 600, **options}

@@ -28,16 +28,16 @@ def test_price_a_frame(benchmark, run):
     benchmark(lambda: run.on(run.machine).milliseconds)
 
 
-def test_price_200_machines(benchmark, run):
-    got = benchmark.pedantic(lambda: run.prices(machines(run, 200)), rounds=3)
+def test_price_200_machines(benchmark, run, scaled):
+    got = benchmark.pedantic(lambda: run.prices(machines(run, scaled(200))), rounds=3)
     assert np.isfinite(got.frame).all()
 
 
-def test_price_10000_machines(benchmark, run):
+def test_price_10000_machines(benchmark, run, scaled):
     if run.width != SMALL[0]:
         pytest.skip("of the small frame")
-    got = benchmark.pedantic(lambda: run.prices(machines(run, 10_000)), rounds=1)
-    assert got.milliseconds.shape == (10_000, len(run.launches))
+    got = benchmark.pedantic(lambda: run.prices(machines(run, scaled(10_000))), rounds=1)
+    assert got.milliseconds.shape == (scaled(10_000), len(run.launches))
 
 
 def test_price_works_in_machine_events(benchmark, run):
