@@ -45,7 +45,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
 from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of
 from tilestamp.models.numbers import Number as M
-from tilestamp.models.turns import in_turn, rest_of
+from tilestamp.models.turns import at_least, in_turn, rest_of
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
 
@@ -157,11 +157,18 @@ def loads(
     if not launch.drawn:
         atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
         moves = _shares(sizes, memory)
-        pace = Pace(terms[Term.START] / max(1, count), start, machine[M.MEMORY_LOADED_LATENCY])
-        return Loads(sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way, launch.loop)
+        slower = 1.0 if launch.loop else machine[M.MEMORY_LOADED_LATENCY]  # a loop has its share of memory all along
+        pace = Pace(terms[Term.START] / max(1, count), start, slower)
+        if launch.loop:
+            sm, own, alone = at_least(sm, sms * moves), at_least(own, sms * moves), at_least(alone, sms * moves)
+        return Loads(
+            sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way, launch.loop
+        )  # fmt: skip
     draws = _shares(requests, terms[Term.QUEUE])
     pace = Pace(0.0, 0.0, 1.0)
-    return Loads(sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way, launch.loop)
+    return Loads(
+        sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way, launch.loop
+    )  # fmt: skip
 
 
 @kernel

@@ -23,6 +23,12 @@ def both(chain: float, own: float) -> float:
 
 
 @kernel
+def at_least(costs: Any, share: Any) -> Any:
+    """Costs of the units on their SM, (units,), where it gets no more than its ``share`` of the chip's memory."""
+    return np.maximum(costs, share)
+
+
+@kernel
 def rest_of(sm: Any, places: int, sms: int) -> Any:
     """Work of an SM beside and behind each unit, (units,), in cycles.
 
