@@ -49,8 +49,7 @@ class MachineEvent(IntEnum):
     CHAIN_LOAD = 23  # dependent global loads (loads in flight together count once)
     CHAIN_ATOMIC = 24  # dependent global atomics whose return value is awaited
     CHAIN_BARRIER = 25  # barriers on the chain
-    # issue slots that pass empty although warps are ready: what instructions hold a scheduler beyond the cycles of their class
-    ISSUE_STALLS = 26
+    ISSUE_STALLS = 26  # cycles that instructions hold their scheduler beyond those of their class
 
 
 INSTRUCTION_CLASSES = tuple(MachineEvent(i) for i in range(MachineEvent.BARRIER + 1))

@@ -1,9 +1,10 @@
 """Turns: kernels that loop over lists, whose warps ask for a scheduler all along their chains.
 
 Warps of other kernels wait most of their time, and who is in whose way is a matter of chance (``models.schedule``). A
-loop asks again and again. So a unit that would take ``chain`` cycles by itself and wants ``own`` of its schedulers takes
-neither the larger of the two nor their sum, but ``(chain^KNEE + own^KNEE)^(1/KNEE)``, and so do residents together, for
-as long as there are others beside it. Half of that is waited for, as of all that two want at the same time.
+loop asks again and again. So a unit that would take ``chain`` cycles by itself and wants ``own`` of its schedulers
+takes neither the larger of the two nor their sum, but ``(chain^KNEE + own^KNEE)^(1/KNEE)``, and so do residents
+together, for as long as there are others beside it. Half of that is waited for, as of all that two want at the same
+time. And an SM that loads or stores all along gets its share of L2 and DRAM, and no more.
 """
 
 from typing import Any

@@ -28,6 +28,7 @@ TIME_METRIC, SPAN_METRIC = "cupti_us_median", "cupti_span_us_median"
 COUNTED = "ncu_cold"
 COUNTS = "stats"
 PIPELINE = "pipeline"
+ByKernel = dict[tuple[str, str], float]
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def read_measured(file: Path, scene: Scene) -> Iterator[Measured]:
         yield Measured(scene, variant, tile, int(width), int(height), camera, *_values(rows))
 
 
-def _values(rows: "pd.DataFrame") -> tuple[dict[str, float], dict[tuple[str, str], float], dict[tuple[str, str], float]]:
+def _values(rows: "pd.DataFrame") -> tuple[dict[str, float], ByKernel, ByKernel]:
     """Times, counters and counts; a time measured twice is the mean of both."""
     timed = rows[rows.source.isin(TIMED)]
     times = timed[timed.metric == TIME_METRIC].groupby("kernel").value.mean().to_dict()
