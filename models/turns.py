@@ -33,11 +33,11 @@ def at_least(costs: Any, share: Any) -> Any:
 def rest_of(sm: Any, places: int, sms: int) -> Any:
     """Work of an SM beside and behind each unit, (units,), in cycles.
 
-    Of what is beside it, but for the first round, half is over when it starts. What is longer than all but one unit an
-    SM counts as no longer than those: it has an SM to itself.
+    Of what is beside it, but for the first round, half is over when it starts. The longest units, one an SM, count as
+    no longer than the others: they have an SM to themselves.
     """
     count = len(sm)
-    longest = np.partition(sm, count - sms)[count - sms] if count > sms else 0.0
+    longest = np.partition(sm, count - sms - 1)[count - sms - 1] if count > sms else 0.0
     behind, found = 0.0, np.empty(count)
     for i in range(count - 1, -1, -1):
         found[i] = behind
@@ -67,5 +67,5 @@ def in_turn(own: float, alone: float, rest: float, others: float) -> float:
     if others <= 0.0:
         return 0.0
     chain = alone * max(0.0, 1.0 - (own / alone) ** KNEE) ** (1.0 / KNEE)
-    crowded = both(chain, own + others * alone)
+    crowded: float = both(chain, own + others * alone)
     return max(0.0, crowded - alone) * min(1.0, rest / (others * alone))

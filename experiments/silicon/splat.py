@@ -91,8 +91,10 @@ def compared(measured: Measured) -> Iterator[dict[str, Any]]:
 
 def draw(measured: Measured) -> Run:
     """Draw one configuration."""
-    size = {"width": measured.width, "height": measured.height}
-    return simulate(measured.scene, "splat", "h200", camera=measured.camera, **size, **measured.options)
+    return simulate(
+        measured.scene, "splat", "h200", width=measured.width, height=measured.height, camera=measured.camera,
+        **measured.options,
+    )  # fmt: skip
 
 
 def kernel_names(launches: list[Launch]) -> list[str]:
