@@ -10,8 +10,8 @@ l1          the load/store path of its SM: bytes of its transactions, and the re
 
 and cannot finish before its ``alone`` time: the round trips of its dependent ``chain``, of a lone warp, and what that
 warp waits for others of its block on the same scheduler (half of what both want), with its own ``l1`` on top where the
-block's warps go in step; or its own instructions when its warps are too few for all schedulers. What all units together
-ask of the chip is ``models.bounds``'s.
+block's warps go in step; or its own instructions when its warps are too few for all schedulers. A loop issues all along
+its chain, and takes what ``models.turns`` says. What all units together ask of the chip is ``models.bounds``'s.
 
 All but a few maxima are sums of machine events times cycles: ``rates`` makes the matrix, and ``demands`` sees of a
 machine nothing else, so that two machines with the same matrix have the same demands.
@@ -32,6 +32,7 @@ from tilestamp.models.numbers import Number as M
 from tilestamp.models.numbers import numbers_of
 from tilestamp.models.sums import TOGETHER, sum_up
 from tilestamp.models.traffic import Traffic
+from tilestamp.models.turns import both
 
 Cycles = NDArray[np.float64]
 CLASSES = len(INSTRUCTION_CLASSES)
@@ -61,6 +62,7 @@ class Other(IntEnum):
     SPREAD = 1  # schedulers / those that a unit's warps can use
     BESIDE = 2  # share of its issue that the warp of a block's chain waits for others on its scheduler
     IN_STEP = 3  # 1 where a unit's own way through the load and store path comes on top of its chain, else 0
+    LOOP = 4  # 1 where its warps issue all along its chain, else 0
 
 
 class Demand(NamedTuple):
@@ -155,6 +157,7 @@ def _issue_rates(matrix: Any, machine: Any) -> None:
     schedulers = machine[M.SM_SCHEDULERS]
     for column in range(CLASSES):
         matrix[Sum.DISPATCH, column] = machine[M.ISSUE_FP32 + column] / schedulers
+    matrix[Sum.DISPATCH, E.ISSUE_STALLS] = 1.0 / schedulers
     matrix[Sum.PIPE_FP32, E.FP32] = machine[M.PIPE_FP32] / schedulers
     matrix[Sum.PIPE_INT32, E.INT32] = machine[M.PIPE_INT32] / schedulers
     matrix[Sum.PIPE_INT32, E.CONTROL] = machine[M.PIPE_CONTROL] / schedulers
@@ -193,7 +196,7 @@ def _other_rates(others: Any, launch: Shape, machine: Any) -> None:
     warps = -(-launch.block // machine[M.SM_WARP_SIZE]) if launch.block_is_unit else 1.0
     others[Other.START] = 0.0 if launch.drawn else machine[M.LATENCY_BLOCK_LAUNCH_CYCLES]
     others[Other.SPREAD] = schedulers / min(schedulers, warps)
-    others[Other.IN_STEP] = launch.in_step
+    others[Other.IN_STEP], others[Other.LOOP] = launch.in_step, launch.loop
     if warps > schedulers:
         others[Other.BESIDE] = IN_THE_WAY * min(1.0, warps / schedulers - 1.0) * schedulers / warps
 
@@ -230,8 +233,11 @@ def demands(events: Any, matrix: Any, found: Demand) -> Whole:
             shared, l1, chain = row[Sum.SHARED], row[Sum.L1], row[Sum.CHAIN] + others[Other.START]
             found.issue[unit], found.shared[unit], found.l1[unit], found.chain[unit] = issue, shared, l1, chain
             found.scheduler[unit] = issue * others[Other.SPREAD]
-            waited = issue * others[Other.BESIDE] + l1 * others[Other.IN_STEP]
-            found.alone[unit] = max(chain + waited, found.scheduler[unit])
+            if others[Other.LOOP]:
+                found.alone[unit] = both(chain, found.scheduler[unit])
+            else:
+                waited = issue * others[Other.BESIDE] + l1 * others[Other.IN_STEP]
+                found.alone[unit] = max(chain + waited, found.scheduler[unit])
             issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
             trips = max(1.0, events[E.CHAIN_LOAD, unit] + events[E.CHAIN_ATOMIC, unit])
             way = min(way, others[Other.START] + row[Sum.CHAIN] / trips)

@@ -49,6 +49,7 @@ class MachineEvent(IntEnum):
     CHAIN_LOAD = 23  # dependent global loads (loads in flight together count once)
     CHAIN_ATOMIC = 24  # dependent global atomics whose return value is awaited
     CHAIN_BARRIER = 25  # barriers on the chain
+    ISSUE_STALLS = 26  # cycles that instructions hold their scheduler beyond those of their class
 
 
 INSTRUCTION_CLASSES = tuple(MachineEvent(i) for i in range(MachineEvent.BARRIER + 1))

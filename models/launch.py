@@ -69,7 +69,7 @@ class Shape(NamedTuple):
         Whether units are drawn from a queue by persistent blocks or warps.
     block_is_unit : bool
         Whether all warps of a block work on a unit together; else each warp draws its own.
-    in_step : bool
+    in_step, loop : bool
         As in ``Launch``.
     """
 
@@ -79,6 +79,7 @@ class Shape(NamedTuple):
     drawn: bool
     block_is_unit: bool
     in_step: bool
+    loop: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,6 +103,8 @@ class Launch:
     in_step : bool
         Whether all warps of a unit load, compute and store at the same time, so that its own way through the SM's load
         and store path comes on top of its chain.
+    loop : bool
+        Whether the warps of a unit issue all along its chain, so that residents are served in turn (``models.turns``).
     streams : tuple of Stream
         The buffers touched.
     atomic_requests : ndarray, (chunks,), int64, or None
@@ -117,6 +120,7 @@ class Launch:
     events: NDArray[np.float64]
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
     in_step: bool = False
+    loop: bool = False
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
 
@@ -124,7 +128,7 @@ class Launch:
     def shape(self) -> Shape:
         """What a kernel sees of it."""
         drawn, alone = self.dispatch != "blocks", self.dispatch != "warp_queue"
-        return Shape(len(self.events), self.grid, self.block, drawn, alone, self.in_step)
+        return Shape(len(self.events), self.grid, self.block, drawn, alone, self.in_step, self.loop)
 
     @cached_property
     def columns(self) -> NDArray[np.float64]:

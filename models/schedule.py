@@ -45,6 +45,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
 from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of
 from tilestamp.models.numbers import Number as M
+from tilestamp.models.turns import at_least, in_turn, rest_of
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
 
@@ -76,6 +77,8 @@ class Loads(NamedTuple):
         Cycles of the fuller of DRAM and L2, and of the atomic units; draws are not among them.
     way : float
         Cycles before their first request and after their last: one round trip of the shortest chain.
+    loop : bool
+        As in ``Launch``.
     """
 
     sm: NDArray[np.float64]
@@ -90,6 +93,7 @@ class Loads(NamedTuple):
     memory: float
     atomic: float
     way: float
+    loop: bool
 
 
 class Played(NamedTuple):
@@ -153,11 +157,18 @@ def loads(
     if not launch.drawn:
         atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
         moves = _shares(sizes, memory)
-        pace = Pace(terms[Term.START] / max(1, count), start, machine[M.MEMORY_LOADED_LATENCY])
-        return Loads(sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way)
+        slower = 1.0 if launch.loop else machine[M.MEMORY_LOADED_LATENCY]  # a loop has its share of memory all along
+        pace = Pace(terms[Term.START] / max(1, count), start, slower)
+        if launch.loop:
+            sm, own, alone = at_least(sm, sms * moves), at_least(own, sms * moves), at_least(alone, sms * moves)
+        return Loads(
+            sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way, launch.loop
+        )  # fmt: skip
     draws = _shares(requests, terms[Term.QUEUE])
     pace = Pace(0.0, 0.0, 1.0)
-    return Loads(sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way)
+    return Loads(
+        sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way, launch.loop
+    )  # fmt: skip
 
 
 @kernel
@@ -178,7 +189,7 @@ def play(units: Loads) -> Played:
     crowded, more = crowd(units)
     end, started, held = ends(units, crowded, units.places, record_of(0))
     waited = end * more / (own + more) if more else 0.0
-    if more and own / units.sms < end + waited:
+    if more and not units.loop and own / units.sms < end + waited:
         lonely, lonely_started, lonely_held = ends(units, units.alone, units.sms, record_of(0))
         if lonely < end:
             started, held = lonely_started, lonely_held
@@ -200,9 +211,14 @@ def crowd(units: Loads) -> tuple[Any, float]:
     """What each unit takes by itself and waits for its neighbours, (units,), and the cycles that all wait."""
     if min(len(units.sm), units.places) <= units.sms:
         return units.alone, 0.0
-    work, crowded, waited = _neighbours(units), np.empty(len(units.sm)), 0.0
+    crowded, waited = np.empty(len(units.sm)), 0.0
+    rest = rest_of(units.sm, units.places, units.sms) if units.loop else np.empty(0)
+    beside = min(len(units.sm), units.places) / units.sms - 1.0
+    others = beside * units.sm.sum() / units.alone.sum()
+    work = 0.0 if units.loop else _neighbours(units)
     for i in range(len(units.sm)):
-        wait = IN_THE_WAY * min(units.own[i], work)
+        wait = in_turn(units.own[i], units.alone[i], rest[i], others) if units.loop else min(units.own[i], work)
+        wait *= IN_THE_WAY
         crowded[i] = units.alone[i] + wait
         waited += wait
     return crowded, waited

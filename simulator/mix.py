@@ -50,6 +50,7 @@ from tilestamp.simulator.work import Work
 MIXES = Path(__file__).parent / "mixes"
 PROVENANCES = ("published", "measured", "disassembled", "derived", "fitted", "assumed")
 _ABOUT = {"provenance", "source", "lanes", "fitted", "fitted_to"}
+_SWITCHES = {"uncached": "uncached_local", "in_step": "in_step", "loop": "loop"}  # of a kernel, and its key in a file
 _COLUMNS = {event.name.lower(): event for event in MachineEvent}
 
 
@@ -69,7 +70,7 @@ class KernelMix:
         By event and column: what was fitted of a price.
     uncached : bool
         Whether local memory passes L1 by.
-    in_step : bool
+    in_step, loop : bool
         As in ``Launch``.
     """
 
@@ -81,6 +82,7 @@ class KernelMix:
     fitted: dict[tuple[str, str], Fitted] = field(default_factory=dict)
     uncached: bool = False
     in_step: bool = False
+    loop: bool = False
 
     @property
     def as_moved(self) -> "KernelMix":
@@ -157,6 +159,7 @@ class Mix:
             events=_machine_events(kernel.matrix(work.events, warp), work.table),
             dispatch=work.dispatch,
             in_step=kernel.in_step,
+            loop=kernel.loop,
             streams=(*work.streams, *_local_memory(kernel, work)),
             atomic_requests=work.atomic_requests,
         )
@@ -257,8 +260,8 @@ def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, li
         for column, part in _fitted_parts(price, about[event][0]).items()
     }
     registers, shared_bytes = int(table.get("registers", 16)), int(table.get("shared_bytes", 0))
-    uncached, in_step = bool(table.get("uncached_local")), bool(table.get("in_step"))
-    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, uncached, in_step)
+    switches = {name: bool(table.get(key)) for name, key in _SWITCHES.items()}
+    return KernelMix(kernel, registers, shared_bytes, prices, about, fitted, **switches)
 
 
 def _fitted_parts(price: dict[str, Any], kind: str) -> dict[str, float]:

@@ -249,8 +249,9 @@ def blend(
 def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int = 0) -> Work:
     """Work of the kernel, from the rows of all tiles."""
     total = dict(zip(_E, table.sum(axis=0).tolist(), strict=True))
-    entries, pixels, gathers = total[_E.ENTRIES], total[_E.PIXELS], COLOURS * total[_E.BLEND_TRIPS]
+    entries, pixels, fetches = total[_E.ENTRIES], total[_E.PIXELS], total[_E.COLOUR_FETCHES]  # later warps find L1
     used = min(count, entries)
+    span = (POSITION_BYTES + CONIC_BYTES + 4 * COLOURS) * used  # neighbouring tiles list the same Gaussians
     several = f" threads {threads}" if threads < tiles.pixels else ""
     return Work(
         stage="blend",
@@ -263,9 +264,9 @@ def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int 
         variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}",
         streams=(
             Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
-            Stream("positions", "load", 32 * entries, POSITION_BYTES * used),
-            Stream("conics", "load", 32 * entries, CONIC_BYTES * used),
-            Stream("colours", "load", 32 * gathers, 4 * COLOURS * used),
+            Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),
+            Stream("conics", "load", 32 * entries, CONIC_BYTES * used, span_bytes=span),
+            Stream("colours", "load", 32 * fetches, 4 * COLOURS * used, span_bytes=span),
             Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * pixels),
         ),
     )

@@ -110,6 +110,7 @@ def _count_warp(
     row[_E.ROW_TRIPS] += row_trips
     row[_E.TRIPS] += trips
     row[_E.LONGEST_TRIPS] = max(row[_E.LONGEST_TRIPS], trips)
+    row[_E.LONGEST_ROW_TRIPS] = max(row[_E.LONGEST_ROW_TRIPS], row_trips)
     if visible:
         for k in range(3 if tight else 2):
             size = 4 << k

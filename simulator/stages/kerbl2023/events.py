@@ -78,6 +78,7 @@ class DuplicateEvent(IntEnum):
     STORE_TRANSACTIONS = 11
     STORE_BYTES = 12
     BLOCKS = 13
+    LONGEST_ROW_TRIPS = 14  # of the warp with most
 
 
 class SortEvent(IntEnum):
@@ -95,6 +96,10 @@ class SortEvent(IntEnum):
     PASSES = 9  # digits a key that the block looks at: all in the histogram, else 1
     ALIKE = 10  # 1 where all pairs of the block have one digit: a short way
     MIXED = 11  # 1 where they have several
+    LISTED = 12  # 1 where the block of the histogram has any pairs
+    ATOMIC = 13  # instructions that add the block's counts to those of all
+    ATOMIC_LANES = 14
+    ATOMIC_REQUESTS = 15
 
 
 @shown(count("LISTED_TILES", "tiles with pairs"))

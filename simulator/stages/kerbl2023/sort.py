@@ -28,6 +28,8 @@ ITEMS = 15  # pairs a thread
 SHARED_BYTES = 47104
 HISTOGRAM_BLOCK, HISTOGRAM_SHARED_BYTES, HISTOGRAM_BLOCKS_PER_SM = 128, 8192, 9
 TILE = BLOCK * ITEMS  # pairs a block
+HISTOGRAM_TILE = 16 * HISTOGRAM_BLOCK  # keys that a block of the histogram reads at a time
+COUNTS_A_SECTOR = SECTOR_BYTES // 4
 _E = SortEvent
 
 
@@ -126,7 +128,7 @@ def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> Stage
     blocks = -(-count // TILE)
     passes = -(-bits // DIGIT_BITS)
     other = Pairs(np.empty_like(pairs.keys), np.empty_like(pairs.values))
-    works = [_histogram_work(count, passes, simt), _sum_work(passes, simt)] if counting and count else []
+    works, used = [], np.zeros((passes, RADIX), np.bool_)
     counts, starts = np.empty((2, blocks, RADIX), np.int64)
     parts = parts_of(blocks)
     for k in range(passes):
@@ -134,10 +136,13 @@ def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> Stage
         counts[:] = 0
         for_parts(_histogram, parts, pairs.keys, shift, counts)
         _starts(counts, starts)
+        used[k] = counts.any(axis=0)
         if counting and count:
             works.append(_pass_work(k, counts, starts, count, simt))
         for_parts(_scatter, parts, *pairs, shift, starts, *other)
         pairs, other = other, pairs
+    if works:
+        works = [_histogram_work(count, used, simt), _sum_work(passes, simt), *works]
     return StageResult(pairs, tuple(works))
 
 
@@ -166,15 +171,25 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
     )
 
 
-def _histogram_work(pairs: int, passes: int, simt: Simt) -> Work:
-    """Persistent blocks, a fixed number an SM, that each count the digits of a share of the keys."""
-    blocks = HISTOGRAM_BLOCKS_PER_SM * simt.sms
+def _histogram_work(pairs: int, used: NDArray[np.bool_], simt: Simt) -> Work:
+    """Persistent blocks, a fixed number an SM, that each count the digits of some tiles of keys, and add up at the end.
+
+    ``used`` are the digits that occur, (passes, RADIX). A block is taken to have all of them: it adds each sector of
+    counts that is not empty, and all blocks want the same few.
+    """
+    blocks, tiles = HISTOGRAM_BLOCKS_PER_SM * simt.sms, -(-pairs // HISTOGRAM_TILE)
     table = np.zeros((blocks, len(_E)), np.int64)
     table[:, _E.WARPS] = -(-HISTOGRAM_BLOCK // simt.warp)
-    table[:, _E.PAIRS] = np.diff(np.arange(blocks + 1) * pairs // blocks)
-    table[:, _E.BLOCKS], table[:, _E.PASSES] = 1, passes
+    table[:, _E.PAIRS] = (tiles // blocks + (np.arange(blocks) < tiles % blocks)) * HISTOGRAM_TILE
+    table[(tiles - 1) % blocks, _E.PAIRS] -= tiles * HISTOGRAM_TILE - pairs
+    table[:, _E.BLOCKS], table[:, _E.PASSES], table[:, _E.LISTED] = 1, len(used), table[:, _E.PAIRS] > 0
     table[:, _E.LOAD_TRANSACTIONS] = -(-table[:, _E.PAIRS] * KEY_BYTES // SECTOR_BYTES)
     table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
+    sectors = used.reshape(len(used), -1, COUNTS_A_SECTOR).any(axis=2)
+    warps = used.reshape(len(used), -1, simt.warp).any(axis=2)
+    adds = {_E.ATOMIC: warps.sum(), _E.ATOMIC_LANES: used.sum(), _E.ATOMIC_REQUESTS: sectors.sum()}
+    for event, count in adds.items():
+        table[:, event] = count * table[:, _E.LISTED]
     return Work(
         stage="sort",
         kernel="sort_histogram",
@@ -184,6 +199,7 @@ def _histogram_work(pairs: int, passes: int, simt: Simt) -> Work:
         block=HISTOGRAM_BLOCK,
         shared_bytes=HISTOGRAM_SHARED_BYTES,
         streams=(Stream("keys", "load", KEY_BYTES * pairs, KEY_BYTES * pairs),),
+        atomic_requests=sectors.ravel() * table[:, _E.LISTED].sum(),
     )
 
 
