@@ -23,7 +23,7 @@ def parts_of(items: int, smallest: int = 1) -> int:
     return max(1, min(items // smallest, PARTS * int(get_num_threads())))
 
 
-def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> None:
+def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> list[Any]:
     """Call ``worker(part, parts, *args)`` for each part, on as many threads as Numba would use.
 
     Parameters
@@ -34,12 +34,18 @@ def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> None:
     *args
         As the worker takes them.
 
+    Returns
+    -------
+    list
+        What the worker returned for each part.
+
     Raises
     ------
     KeyboardInterrupt
         Ctrl-C: parts that have begun are finished, no other begins.
     """
     left = deque(range(parts))
+    results: list[Any] = [None] * parts
 
     def work() -> None:
         while left:
@@ -47,7 +53,7 @@ def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> None:
                 part = left.popleft()
             except IndexError:  # another thread was faster
                 return
-            worker(part, parts, *args)
+            results[part] = worker(part, parts, *args)
 
     helpers = [_pool().submit(work) for _ in range(min(parts, get_num_threads()) - 1)]
     try:
@@ -57,6 +63,7 @@ def for_parts(worker: Callable[..., Any], parts: int, *args: Any) -> None:
         wait(helpers)
     for helper in helpers:
         helper.result()  # raises what it raised
+    return results
 
 
 @cache

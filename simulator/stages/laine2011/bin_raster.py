@@ -18,12 +18,12 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.parallel import for_parts, parts_of
+from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import row_of
 from tilestamp.simulator.stages.laine2011.bin_raster_batch import BinInput, play_batch
 from tilestamp.simulator.stages.laine2011.bin_raster_count import BIN_SEGMENT, BLOCK, ENTRY_BYTES
-from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, transaction_bytes
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, place_pairs, transaction_bytes
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 from tilestamp.simulator.work import Work
@@ -50,10 +50,9 @@ class BinQueues(NamedTuple):
 
 
 @kernel
-def _play_part(part: int, parts: int, given: Any, batch: int, counts: Any, entries: Any, events: Any) -> None:
-    """Play a share of the batches, each with its own rows: see ``play_batch``."""
-    for b in range(counts.shape[0] * part // parts, counts.shape[0] * (part + 1) // parts):
-        play_batch(given, b, batch, counts[b], entries, row_of(events, b))
+def _play_part(part: int, _parts: int, given: Any, batch: int, counts: Any, events: Any) -> Any:
+    """Play one batch, with its own rows: see ``play_batch``."""
+    return play_batch(given, part, batch, counts[part], row_of(events, part))
 
 
 def bin_raster(
@@ -116,11 +115,11 @@ def bin_raster(
     batches = -(-triangles // batch)
     counts = np.zeros((batches, bins_x * bins_y), np.int64)
     events = np.zeros((batches, len(BinRasterEvent)), np.int64) if counting else None
-    for_parts(_play_part, parts_of(batches), given, batch, counts, None, events)
+    pairs = for_parts(_play_part, batches, given, batch, counts, events)
     starts = np.concatenate([[0], np.cumsum(counts.sum(axis=0))])
     cursors = starts[:-1] + np.cumsum(counts, axis=0) - counts
     entries = np.empty(starts[-1], np.int32)
-    for_parts(_play_part, parts_of(batches), given, batch, cursors, entries, None)
+    for_parts(lambda b, _: place_pairs(pairs[b], cursors[b], entries), batches)
     queues = BinQueues(starts, entries, counts, _stream_totals(counts), bins_x, bins_y)
     segments = int((-(-counts // BIN_SEGMENT)).sum())
     works = () if events is None else (_work(events, setup, len(entries), segments, segment_bytes, counts.shape[1]),)

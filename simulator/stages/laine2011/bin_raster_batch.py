@@ -1,8 +1,7 @@
 """One batch of bin raster: reads, rounds of 512 and the three coverage paths (Laine & Karras 2011, section 4).
 
-A batch is what a block draws from its queue. It is played twice: ``_count_batch`` counts the entries of each bin and
-every event, ``_fill_batch`` writes the entries where the counts have made room. Both take the same rounds, because
-the path of a warp (which decides whether its triangles are tested) depends on the company that they are in.
+A batch is what a block draws from its queue. It counts the entries of each bin and every event, and lists its pairs of
+a bin and an entry, which are put in their places when all batches have been counted.
 """
 
 from typing import Any, NamedTuple
@@ -35,6 +34,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     lane_box,
     lane_edges,
     new_boxes,
+    room_for,
     small_votes,
     touches,
     walk_votes,
@@ -112,9 +112,9 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
 
 
 @kernel(lent=True)
-def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int]:
-    """Boxes of a warp's triangles; returns the path that follows from them, and the bins of the largest box."""
-    largest, path = 1, SINGLE
+def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int]:
+    """Boxes of a warp's triangles; returns the path that follows from them, bins of the largest box, and of all."""
+    largest, area, path = 1, 0, SINGLE
     last_x, last_y = given.bins_x - 1, given.bins_y - 1
     for lane in range(lanes):
         slot = entry_slot(ring[(first + lane) % RING], given.misc)
@@ -122,6 +122,7 @@ def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBo
         lane_box(boxes, lane, given.headers[slot], given.half_x, given.half_y, BIN_SIDE_LOG2, last_x, last_y)
         columns, rows = boxes.box[lane, 2], boxes.box[lane, 3]
         largest = max(largest, columns * rows)
+        area += columns * rows
         if columns > 2 or rows > 2:
             path = SLOW
         elif columns * rows > 1 and path == SINGLE:
@@ -129,7 +130,7 @@ def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBo
     if path == SLOW:
         for lane in range(lanes):
             lane_edges(boxes, lane, given.headers[boxes.slot[lane]], given.half_x, given.half_y, BIN_SIDE_LOG2)
-    return path, largest
+    return path, largest, area
 
 
 @kernel(lent=True)
@@ -141,11 +142,15 @@ def _emit_warp(
     scratch: BinScratch,
     first: int,
     counts: Any,
-    entries: Any,
+    pairs: Any,
+    used: int,
     events: Any,
-) -> None:
-    """Append a warp's triangles to the bins that they touch; count the segments of memory that this writes."""
-    emits, stores = 0, 0
+) -> int:
+    """List a warp's triangles with the bins that they touch; count the segments of memory that this writes.
+
+    Returns the pairs in use.
+    """
+    start, stores = used, 0
     for lane in range(lanes):
         box = boxes.box[lane]
         step = 0
@@ -153,19 +158,19 @@ def _emit_warp(
             for column in range(box[2]):
                 if path != SLOW or touches(boxes, lane, column, row):
                     b = box[0] + column + (box[1] + row) * given.bins_x
-                    if entries is not None:
-                        entries[counts[b]] = scratch.ring[(first + lane) % RING]
+                    pairs[used, 0], pairs[used, 1] = b, scratch.ring[(first + lane) % RING]
                     if events is not None:
                         mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
                         stores += scratch.stamp[step, b] != mark
                         scratch.stamp[step, b] = mark
                     counts[b] += 1
-                    emits += 1
+                    used += 1
                 step += 1
     if events is not None:
-        events[BinRasterEvent.EMITS] += emits
+        events[BinRasterEvent.EMITS] += used - start
         events[BinRasterEvent.STORE_TRANSACTIONS] += stores
         events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
+    return used
 
 
 @kernel(lent=True)
@@ -184,12 +189,12 @@ def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
 
 @kernel(lent=True)
 def _count_warp(
-    given: BinInput, path: int, largest: int, boxes: WarpBoxes, lanes: int, scratch: BinScratch, first: int, events: Any
-) -> None:
+    given: BinInput, path: int, largest: int, area: int, boxes: WarpBoxes, lanes: int, scratch: BinScratch, first: int,
+    events: Any,
+) -> None:  # fmt: skip
     """Count what a warp's loads, its path and the walk to its queues cost."""
-    area, indirect = 0, False
+    indirect = False
     for lane in range(lanes):
-        area += boxes.box[lane, 2] * boxes.box[lane, 3]
         indirect |= scratch.ring[(first + lane) % RING] & 7 != SINGLE_TRIANGLE
     events[BinRasterEvent.BOX_BINS] += area
     events[BinRasterEvent.INDIRECT_WARPS] += indirect
@@ -217,11 +222,12 @@ def _count_warp(
 
 
 @kernel
-def play_batch(given: BinInput, b: int, batch: int, counts: Any, entries: Any, events: Any) -> None:
-    """Bin the input triangles of batch b, of ``batch`` triangles.
+def play_batch(given: BinInput, b: int, batch: int, counts: Any, events: Any) -> Any:
+    """Bin the input triangles of batch b, of ``batch`` triangles; fills ``counts`` by bin, returns pairs, (n, 2).
 
-    ``counts`` holds the next place of each bin: from 0 when counting (``entries`` None), into ``entries`` when filling.
+    A pair is a bin and an entry of it; those of a bin come in their order.
     """
+    pairs, used = np.empty((batch, 2), np.int32), np.int64(0)
     first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
     scratch, boxes = _new_scratch(counts.size, events is not None), new_boxes()
     read = write = np.int64(0)  # literals that change in a loop have their callees compiled twice
@@ -232,13 +238,14 @@ def play_batch(given: BinInput, b: int, batch: int, counts: Any, entries: Any, e
         longest, steps, paths = 0, 0, 0
         for start in range(read, read + m, WARP):
             lanes = min(WARP, read + m - start)
-            path, largest = _load_warp(given, scratch.ring, start, lanes, boxes)
+            path, largest, area = _load_warp(given, scratch.ring, start, lanes, boxes)
             if events is not None:
                 scratch.warps[0] += 1
                 longest, paths = max(longest, largest), paths | (1 << path)
                 steps = max(steps, largest if path == SLOW else 0)
-                _count_warp(given, path, largest, boxes, lanes, scratch, start, events)
-            _emit_warp(given, path, boxes, lanes, scratch, start, counts, entries, events)
+                _count_warp(given, path, largest, area, boxes, lanes, scratch, start, events)
+            pairs = room_for(pairs, used, area)
+            used = _emit_warp(given, path, boxes, lanes, scratch, start, counts, pairs, used, events)
         if events is not None:
             events[BinRasterEvent.ROUNDS] += 1
             events[BinRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
@@ -254,3 +261,4 @@ def play_batch(given: BinInput, b: int, batch: int, counts: Any, entries: Any, e
         events[BinRasterEvent.CLOSED_SEGMENTS] += np.count_nonzero(counts)
         count_closing(given, counts, scratch, events)
         count_atomic(events, 1)
+    return pairs[:used]

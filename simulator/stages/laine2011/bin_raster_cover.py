@@ -142,6 +142,26 @@ def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[i
     return ors, replays, ends
 
 
+@kernel
+def room_for(pairs: Any, used: int, more: int) -> Any:
+    """Pairs of a square and an entry, (n, 2), as they are or in a larger array, with room for ``more`` behind."""
+    if used + more <= len(pairs):
+        return pairs
+    larger = np.empty((2 * len(pairs) + more, 2), np.int32)
+    for i in range(used):
+        larger[i, 0], larger[i, 1] = pairs[i, 0], pairs[i, 1]
+    return larger
+
+
+@kernel
+def place_pairs(pairs: Any, cursors: Any, entries: Any) -> None:
+    """Write the entries of pairs where the cursors of their squares stand."""
+    for i in range(len(pairs)):
+        square = pairs[i, 0]
+        entries[cursors[square]] = pairs[i, 1]
+        cursors[square] += 1
+
+
 @kernel(lent=True)
 def header_load(boxes: WarpBoxes, lanes: int, segment_bytes: int) -> tuple[int, int]:
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane."""

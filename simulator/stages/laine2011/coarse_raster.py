@@ -21,7 +21,7 @@ from tilestamp.simulator.parallel import for_parts
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import row_of
 from tilestamp.simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
-from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, transaction_bytes
+from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, place_pairs, transaction_bytes
 from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
     BIN_TILES,
     BLOCK,
@@ -55,9 +55,9 @@ class TileQueues(NamedTuple):
 
 
 @kernel
-def _play_part(part: int, _parts: int, given: Any, order: Any, counts: Any, entries: Any, events: Any) -> None:
+def _play_part(part: int, _parts: int, given: Any, order: Any, counts: Any, events: Any) -> Any:
     """Play one bin, with its own rows: see ``play_bin``."""
-    play_bin(given, order[part], counts[order[part]], entries, row_of(events, part))
+    return play_bin(given, order[part], counts[order[part]], row_of(events, part))
 
 
 def coarse_raster(
@@ -115,12 +115,13 @@ def coarse_raster(
     events = np.zeros((len(order), len(CoarseRasterEvent)), np.int64) if counting else None
     bin_tiles = _bin_tiles(given, bins)
     in_frame = bin_tiles >= 0
-    for_parts(_play_part, len(order), given, order, counts, None, events)
+    pairs = for_parts(_play_part, len(order), given, order, counts, events)
     starts = np.zeros(given.tiles_x * given.tiles_y + 1, np.int64)
     starts[bin_tiles[in_frame] + 1] = counts[in_frame]
     np.cumsum(starts, out=starts)
     entries = np.empty(starts[-1], np.int32)
-    for_parts(_play_part, len(order), given, order, np.where(in_frame, starts[bin_tiles], 0), entries, None)
+    cursors = np.where(in_frame, starts[bin_tiles], 0)[order]
+    for_parts(lambda i, _: place_pairs(pairs[i], cursors[i], entries), len(order))
     used = in_frame[order] & (deferred_clear | (counts[order] > 0))
     active = bin_tiles[order][used].astype(np.int32)
     segments = int((-(-counts // TILE_SEGMENT)).sum())

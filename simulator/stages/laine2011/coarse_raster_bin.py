@@ -2,7 +2,7 @@
 
 A bin is what a block draws from its queue. Its streams are merged segment by segment into input order; a round takes
 512 entries, and each warp sets the bits of the tiles that its triangles touch by the cheapest of three ways. As in
-bin raster a bin is played twice, to count and to fill.
+bin raster pairs of a tile and an entry are listed first, and put in their places when all bins have been counted.
 """
 
 from typing import Any, NamedTuple
@@ -21,6 +21,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     lane_box,
     lane_edges,
     new_boxes,
+    room_for,
     small_votes,
     touches,
     walk_votes,
@@ -79,10 +80,10 @@ def _place(given: CoarseInput, b: int) -> Any:
 
 
 @kernel(lent=True)
-def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int, int]:
-    """Boxes of a warp's triangles; returns its case, tiles of the largest and of the union box, and its rows."""
+def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> Any:
+    """Boxes of a warp's triangles; returns its case, tiles of the largest, the union and all boxes, and its rows."""
     small = True
-    largest = 1
+    largest, area = 1, 0
     low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
     for lane in range(lanes):
         slot = entry_slot(np.int64(given.entries[first + lane]), given.misc)
@@ -92,28 +93,30 @@ def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: 
         x, y, columns, rows = boxes.box[lane]
         small &= columns <= 2 and rows <= 2
         largest = max(largest, columns * rows)
+        area += columns * rows
         low_x, low_y = min(low_x, x), min(low_y, y)
         high_x, high_y = max(high_x, x + columns), max(high_y, y + rows)
     union, rows = (high_x - low_x) * (high_y - low_y), high_y - low_y
     if small:
-        return CASE_A, largest, union, rows
+        return CASE_A, largest, union, area, rows
     for lane in range(lanes):
         lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
-    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, rows
+    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, area, rows
 
 
 @kernel(lent=True)
-def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, queues: Any) -> None:
-    """Append a warp's triangles to the tiles that they touch."""
+def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int) -> int:
+    """List a warp's triangles with the tiles that they touch; returns the pairs in use."""
     for lane in range(lanes):
         box = boxes.box[lane]
         for row in range(box[3]):
             for column in range(box[2]):
                 if case == CASE_A or touches(boxes, lane, column, row):
                     tile = box[0] + column + (box[1] + row) * BIN_TILES
-                    if queues is not None:
-                        queues[counts[tile]] = boxes.slot[lane]
+                    pairs[used, 0], pairs[used, 1] = tile, boxes.slot[lane]
+                    used += 1
                     counts[tile] += 1
+    return used
 
 
 @kernel(lent=True)
@@ -122,6 +125,7 @@ def _count_warp(
     case: int,
     largest: int,
     union: int,
+    area: int,
     rows: int,
     boxes: WarpBoxes,
     lanes: int,
@@ -129,9 +133,8 @@ def _count_warp(
     events: Any,
 ) -> None:
     """Count what a warp's loads and its case cost."""
-    area, indirect = 0, False
+    indirect = False
     for lane in range(lanes):
-        area += boxes.box[lane, 2] * boxes.box[lane, 3]
         indirect |= given.entries[first + lane] & 7 != SINGLE_TRIANGLE
     events[CoarseRasterEvent.BOX_TILES] += area
     events[CoarseRasterEvent.INDIRECT_WARPS] += indirect
@@ -254,15 +257,15 @@ def _count_merge(given: CoarseInput, b: int, events: Any) -> None:
 
 
 @kernel
-def play_bin(given: CoarseInput, b: int, counts: Any, queues: Any, events: Any) -> None:
-    """Find the tiles of a bin's entries.
+def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
+    """Find the tiles of a bin's entries; fills ``counts`` (256,) by tile, returns pairs, (n, 2).
 
-    ``counts`` (256,) holds the next place of each tile: from 0 when counting (``queues`` None), into ``queues`` when
-    filling.
+    A pair is a tile of the bin and a slot; those of a tile come in their order.
     """
     boxes, place = new_boxes(), _place(given, b)
     before, tails = np.zeros(TILES, np.int64), np.zeros(TILES + 1, np.int64)
     start, end = given.starts[b], given.starts[b + 1]
+    pairs, used = np.empty((2 * (end - start), 2), np.int32), np.int64(0)
     if events is not None:
         _count_merge(given, b, events)
         events[CoarseRasterEvent.BINS] += 1
@@ -273,13 +276,14 @@ def play_bin(given: CoarseInput, b: int, counts: Any, queues: Any, events: Any) 
         longest_b, longest_c, cases = 0, 0, 0
         for first in range(read, read + m, WARP):
             lanes = min(WARP, read + m - first)
-            case, largest, union, rows = _load_warp(given, place, first, lanes, boxes)
+            case, largest, union, area, rows = _load_warp(given, place, first, lanes, boxes)
             if events is not None:
                 longest_b = max(longest_b, union if case == CASE_B else 0)
                 longest_c = max(longest_c, largest if case == CASE_C else 0)
                 cases |= 1 if case == CASE_A else 2
-                _count_warp(given, case, largest, union, rows, boxes, lanes, first, events)
-            _emit_warp(case, boxes, lanes, counts, queues)
+                _count_warp(given, case, largest, union, area, rows, boxes, lanes, first, events)
+            pairs = room_for(pairs, used, area)
+            used = _emit_warp(case, boxes, lanes, counts, pairs, used)
         if events is not None:
             events[CoarseRasterEvent.ROUNDS] += 1
             events[CoarseRasterEvent.LONGEST_B] += longest_b
@@ -290,3 +294,4 @@ def play_bin(given: CoarseInput, b: int, counts: Any, queues: Any, events: Any) 
             _count_emits(given, counts, before, tails, events)
     if events is not None:
         _count_tails(given, counts, tails, events)
+    return pairs[:used]
