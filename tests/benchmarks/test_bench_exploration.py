@@ -11,6 +11,8 @@ ROADS = [
     {"grid": 13, "bound": 16.0},
     {"shading": "shared"},
     {"shading": "visible"},
+    {"coarse": 16, "tile": 4},
+    {"coarse": 32, "tile": 8, "second_level": "buckets"},
 ]
 
 
