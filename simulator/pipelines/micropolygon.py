@@ -12,7 +12,7 @@ Modelled
 - Lanes of a warp that want one counter, and requests that queue at the unit of L2 or the lock of DRAM that owns it.
 - A texture over each patch, and cures of cracks that the paper has not (``snap_edges``, ``min_depth``).
 - Roads that the paper leaves for later: larger grids, vertices shared by neighbours, shading after visibility; tiles
-  in two scales.
+  in two scales; grids culled behind what a tile shows.
 
 Not modelled
 ------------
@@ -47,6 +47,7 @@ from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.culled_raster import Cull, culled_raster, dice_nearest
 from tilestamp.simulator.stages.eisenacher2010.dice import GRID_SIDE, Grids, dice
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
 from tilestamp.simulator.stages.eisenacher2010.link_grids import link_grids
@@ -60,6 +61,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
 
+LARGEST_CULLED = 16  # pixels a side of a tile whose grids are culled
 FINE = 8  # pixels a side of a fine tile at most, where warps have one each
 REMARKS = {
     "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn"
@@ -105,6 +107,9 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     """Pixels on a side of coarse tiles that grids are put into first; then into tiles in them (not in the paper)."""
     second_level: Literal["masks", "buckets"] = "masks"
     """How fine tiles get their grids of coarse ones: by masks in shared memory, or by a second bucket pass."""
+    cull: Cull = "none"
+    """Pass over grids behind what a tile shows already, in the order of the list or sorted front to back (not in the
+    paper)."""
     hybrid: bool = False
     """Give the diced grids to the fixed-function rasterizer."""
     texture: NDArray[np.uint8] | None = None
@@ -127,6 +132,15 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
             )
         if self.has_masks and (self.grid > GRID_SIDE or self.shading == "visible"):
             raise TilestampError("coarse tiles with masks: grids of 4x4 vertices that are shaded before")
+        if self.cull != "none" and not self._is_as_published:
+            raise TilestampError("cull: tiles of 4 to 16 as published, with one sample a pixel, edges computed")
+
+    @property
+    def _is_as_published(self) -> bool:
+        """Whether nothing but the culling differs from the published raster."""
+        plain = self.spp == 1 and self.box_tests and self.edges == "computed" and self.tile <= LARGEST_CULLED
+        others = self.coarse or self.shading != "vertices" or self.snap_edges or self.hybrid
+        return plain and not others and self.grid == GRID_SIDE
 
     @property
     def has_masks(self) -> bool:
@@ -199,6 +213,10 @@ def micropolygon(
     if options.has_masks:
         buckets = grids.boxes, count, start, lists, tiles, fine
         pixels, drawn, _ = execute(macro_raster, grids.vertices, *buckets, width, height, simt)
+    elif options.cull != "none":
+        by_depth = options.cull == "sorted"
+        lists_of = count, start, lists, tiles
+        pixels, drawn, _ = execute(culled_raster, grids.vertices, *lists_of, width, height, simt, by_depth=by_depth)
     else:
         pixels, drawn, _ = execute(
             tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
@@ -225,7 +243,7 @@ def _dice(
     execute: Executor,
 ) -> tuple[Grids, Mapping[str, Any]]:
     """Dice by the way of shading; grids, and how many vertices were shaded."""
-    side = options.grid
+    side, shaded = options.grid, len(subpatches.patch) * options.grid**2
     how: dict[str, Any] = {"texture": options.texture, "shaded": execute.picture}
     if options.shading == "visible":
         return execute(dice_positions, points, subpatches, **view, side=side).outputs, {}
@@ -233,8 +251,10 @@ def _dice(
         links = execute(link_grids, subpatches, view["simt"]).outputs
         grids, _, facts = execute(dice_shared, points, subpatches, links, **view, **how, side=side)
         return grids, facts
+    if options.cull != "none":
+        return execute(dice_nearest, points, subpatches, **view, **how).outputs, {"shaded_vertices": shaded}
     grids = execute(dice, points, subpatches, **view, **how, side=side).outputs
-    return grids, {"shaded_vertices": len(subpatches.patch) * side**2}
+    return grids, {"shaded_vertices": shaded}
 
 
 def _maps(

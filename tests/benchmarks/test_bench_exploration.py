@@ -12,6 +12,7 @@ ROADS = [
     {"shading": "shared"},
     {"shading": "visible"},
     {"coarse": 16, "tile": 4},
+    {"cull": "sorted"},
     {"coarse": 32, "tile": 8, "second_level": "buckets"},
 ]
 

@@ -42,6 +42,9 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         *(("h200", {"coarse": coarse, "tile": tile}) for coarse in (16, 32) for tile in (4, 8)),
         *((machine, {"coarse": 16, "second_level": "buckets"}) for machine in ("gtx280", "h200")),
         ("gtx280", {"coarse": 16}),
+        *(("h200", {"cull": "sorted", "tile": tile}) for tile in (4, 8, 16)),
+        *((machine, {"cull": "sorted", "bound": 2.0}) for machine in ("gtx280", "h200")),
+        ("h200", {"cull": "behind"}),
         ("h200", {"grid": 7, "shading": "shared", "texture": TEXTURE}),
     ),
     "cudaraster": (

@@ -7,7 +7,6 @@ walks through the grids of its own fine tile alone: two warps a tile of 8x8, one
 batch ends for all when the warp with the most grids is done, which is counted. One sample a pixel, box tests on.
 """
 
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     block_traffic,
     count_block,
     count_stores,
+    events_with,
     grids_together,
     shape_for,
 )
@@ -53,9 +53,7 @@ _MORE = (
     "CRITICAL_GRIDS",  # grids that the busiest warp of each batch walks through
     "CRITICAL_PASSES",  # pairs of quad and fine tile that go on, in that warp
 )
-_enum: Any = IntEnum
-_names = [*(_IN_PLACE.get(event, event.name) for event in _E), *_MORE]
-MacroRasterEvent: Any = _enum("MacroRasterEvent", _names, start=0, module=__name__)
+MacroRasterEvent: Any = events_with("MacroRasterEvent", _IN_PLACE, _MORE)
 """Events of one block: those of the tile raster, and of masks."""
 shown(*SAMPLE_COUNTERS, distribution("grids", "GRIDS", "grids in the list of a coarse tile"))(MacroRasterEvent)
 _M = MacroRasterEvent
