@@ -43,9 +43,9 @@ WORTH = 1.02  # times as fast: less is no gain that the model can tell
 
 
 SURE = (
-    "Counts are executed; the prices of masks and of the second pass are derived by hand. Before compute capability 9 the"
-    " mix has no chain of dependent instructions for quads: there unequal lists of warps cost nothing, and the gain of"
-    " masks is at most what is shown."
+    "Counts are executed; the prices of masks and of the second pass are derived by hand. Before compute capability 9"
+    " the mix has no chain of dependent instructions for quads: there unequal lists of warps cost nothing, and the gain"
+    " of masks is at most what is shown."
 )
 
 
