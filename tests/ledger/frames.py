@@ -36,7 +36,8 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"snap_edges": True}),
         ("h200", {"bound_rule": "pixel_extent", "min_depth": 3, "near": 0.1}),
         *(("h200", {"shading": "visible", "tile": tile}) for tile in (4, 8, 16, 32)),  # roads not taken, from here on
-        *(("gtx280", {"shading": "visible", "edges": edges}) for edges in ("computed", "loaded")),
+        *(("gtx280", {"shading": "visible", "edges": edges, "texture": TEXTURE}) for edges in ("computed", "loaded")),
+        ("h200", {"snap_edges": True, "texture": TEXTURE}),
         ("gtx280", {"shading": "shared"}),
         ("h200", {"grid": 5}),
         *(("h200", {"coarse": coarse, "tile": tile}) for coarse in (16, 32) for tile in (4, 8)),
