@@ -24,7 +24,8 @@ A file may leave the kernels that it has no table for to the file of an older fa
 
 An event that bears the name of a machine event needs no table: it passes through. A table may be of one compiled
 variant alone, ``["tile_raster: tile 8 spp 4"]`` (``Work.variant``); the others take the kernel's own. What it has in
-common with a table before it need not be said again: ``like = "tile_raster"``.
+common with a table before it need not be said again: ``like = "tile_raster"``; of that, events that the kernel has not
+are left out: ``without = ["RESOLVE_WARPS"]``.
 """
 
 import hashlib
@@ -239,7 +240,7 @@ def _completed(mix: str, tables: dict[str, dict[str, Any]], table: dict[str, Any
         return table
     if like not in tables:
         raise TilestampError(f"the mix {mix} has a table like {like}, which it does not have")
-    return tables[like] | table
+    return {event: price for event, price in tables[like].items() if event not in table.get("without", ())} | table
 
 
 def _kernel_mix(mix: str, kernel: str, table: dict[str, Any], fits: dict[str, list[str]]) -> KernelMix:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, megabytes, milliseconds
+from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, megabytes, milliseconds, other_pixels
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.studies_shipped.finding import finding, reported
@@ -84,7 +84,7 @@ def _row(way: Way, machine: str) -> dict[str, Any]:
         "shading_ms": milliseconds(run, ("link_grids", "dice", "shade_visible")),
         "raster_ms": milliseconds(run, ("bucket_count", "bucket_scan", "bucket_write", "tile_raster")),
         "ms": run.milliseconds,
-        "other_pixels": int((run.image != WAYS[0].run(machine).image).any(axis=2).sum()),
+        "other_pixels": other_pixels(run, WAYS[0].run(machine)),
     }
 
 

@@ -1,11 +1,14 @@
-"""What the roads of one pipeline share: ways to draw the teapot, each with a name, and what a frame takes."""
+"""What the roads of one pipeline share: ways to draw patches, each with a name, and what a frame takes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from tilestamp.simulator.run import Run
+from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.simulation import simulate
 
 SIZE = (640, 480)  # pixels
@@ -15,15 +18,25 @@ MEGABYTE = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A way to draw the teapot's patches: options of the pipeline micropolygon."""
+    """A way to draw the teapot's patches, or a scene in clip space: options of the pipeline micropolygon."""
 
     name: str
     options: Mapping[str, Any] = field(default_factory=dict)
+    scene: Scene | None = None
+    size: tuple[int, int] = SIZE
 
     @cache  # noqa: B019 - ways are constants
     def run(self, machine: str) -> Run:
         """A frame, counted and priced."""
-        return simulate("teapot", "micropolygon", machine, width=SIZE[0], height=SIZE[1], **self.options)
+        width, height = self.size
+        view: dict[str, Any] = {"camera": np.eye(4)} if self.scene else {}
+        shown = self.scene or "teapot"
+        return simulate(shown, "micropolygon", machine, width=width, height=height, **view, **self.options)
+
+
+def other_pixels(run: Run, base: Run) -> int:
+    """Pixels that differ from those of another frame."""
+    return int((run.image != base.image).any(axis=2).sum())
 
 
 def megabytes(run: Run) -> float:

@@ -75,6 +75,9 @@ ROADS = [  # not taken by the papers (experiments/exploration)
     Variant("micropolygon", "7x7 grids", {"grid": 7, "bound": 8}),
     Variant("micropolygon", "shared vertices", {"shading": "shared"}),
     Variant("micropolygon", "shading what is visible", {"shading": "visible"}),
+    Variant("micropolygon", "masks, tile 4 in 16", {"coarse": 16, "tile": 4}),
+    Variant("micropolygon", "grids sorted and culled", {"cull": "sorted"}),
+    Variant("micropolygon", "buckets, tile 8 in 32", {"coarse": 32, "second_level": "buckets"}),
 ]
 FILTERED = [
     Variant(pipeline, f"{texture_filter} texels", {"texture_filter": texture_filter, **BOTH_SIDES})

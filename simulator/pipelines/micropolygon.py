@@ -11,7 +11,8 @@ Modelled
 - Tile raster with and without box tests, with edges computed or loaded, at 1, 4 and 16 samples.
 - Lanes of a warp that want one counter, and requests that queue at the unit of L2 or the lock of DRAM that owns it.
 - A texture over each patch, and cures of cracks that the paper has not (``snap_edges``, ``min_depth``).
-- Roads that the paper leaves for later: larger grids, vertices shared by neighbours, shading after visibility.
+- Roads that the paper leaves for later: larger grids, vertices shared by neighbours, shading after visibility; tiles
+  in two scales; grids culled behind what a tile shows.
 
 Not modelled
 ------------
@@ -46,9 +47,12 @@ from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
+from tilestamp.simulator.stages.eisenacher2010.culled_raster import Cull, culled_raster, dice_nearest
 from tilestamp.simulator.stages.eisenacher2010.dice import GRID_SIDE, Grids, dice
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
 from tilestamp.simulator.stages.eisenacher2010.link_grids import link_grids
+from tilestamp.simulator.stages.eisenacher2010.macro_raster import macro_raster
+from tilestamp.simulator.stages.eisenacher2010.refine_buckets import refine_buckets
 from tilestamp.simulator.stages.eisenacher2010.shade_visible import dice_positions, shade_visible
 from tilestamp.simulator.stages.eisenacher2010.shared_vertices import dice_shared
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import snap_edges
@@ -57,6 +61,8 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
 
+LARGEST_CULLED = 16  # pixels a side of a tile whose grids are culled
+FINE = 8  # pixels a side of a fine tile at most, where warps have one each
 REMARKS = {
     "given_up": "{:,} sub-patches were still large, or across the eye's plane, at the last halving and are not drawn"
 }
@@ -97,6 +103,13 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     shading: Literal["vertices", "shared", "visible"] = "vertices"
     """Vertices of each grid by itself, each vertex that neighbours share once, or grids that are seen (the last two are
     not in the paper)."""
+    coarse: Literal[16, 32] | None = None
+    """Pixels on a side of coarse tiles that grids are put into first; then into tiles in them (not in the paper)."""
+    second_level: Literal["masks", "buckets"] = "masks"
+    """How fine tiles get their grids of coarse ones: by masks in shared memory, or by a second bucket pass."""
+    cull: Cull = "none"
+    """Pass over grids behind what a tile shows already, in the order of the list or sorted front to back (not in the
+    paper)."""
     hybrid: bool = False
     """Give the diced grids to the fixed-function rasterizer."""
     texture: NDArray[np.uint8] | None = None
@@ -111,11 +124,34 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
             raise TilestampError("shading: hybrid and snap_edges shade the vertices of each grid by itself")
         if self.shading == "visible" and (self.spp > 1 or not self.box_tests):
             raise TilestampError("shading what is visible is written for one sample a pixel, with box tests")
+        if self.coarse and (self.coarse <= self.tile or self.hybrid):
+            raise TilestampError("coarse tiles are larger than tiles, and not for the hybrid")
+        if self.has_masks and (self.tile > FINE or self.spp > 1 or not self.box_tests or self.edges == "loaded"):
+            raise TilestampError(
+                "coarse tiles with masks: tiles of 4 or 8, one sample a pixel, box tests, edges computed"
+            )
+        if self.has_masks and (self.grid > GRID_SIDE or self.shading == "visible"):
+            raise TilestampError("coarse tiles with masks: grids of 4x4 vertices that are shaded before")
+        if self.cull != "none" and not self._is_as_published:
+            raise TilestampError("cull: tiles of 4 to 16 as published, with one sample a pixel, edges computed")
+
+    @property
+    def _is_as_published(self) -> bool:
+        """Whether nothing but the culling differs from the published raster."""
+        plain = self.spp == 1 and self.box_tests and self.edges == "computed" and self.tile <= LARGEST_CULLED
+        others = self.coarse or self.shading != "vertices" or self.snap_edges or self.hybrid
+        return plain and not others and self.grid == GRID_SIDE
+
+    @property
+    def has_masks(self) -> bool:
+        """Whether the raster is that of coarse tiles, with masks of fine ones."""
+        return self.coarse is not None and self.second_level == "masks"
 
     def launches(self, simt: Simt) -> list[Work]:
         """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
         loaded = self.edges == "loaded"
-        shape = block_shape(self.tile, self.spp, simt, box_tests=self.box_tests, loaded=loaded, grid=self.grid)
+        size = self.coarse if self.coarse and self.has_masks else self.tile
+        shape = block_shape(size, self.spp, simt, box_tests=self.box_tests, loaded=loaded, grid=self.grid)
         return [] if self.hybrid else [raster_work(shape, np.zeros((0, len(TileRasterEvent)), np.int64))]
 
 
@@ -156,7 +192,8 @@ def micropolygon(
         raise TilestampError(f"the pipeline micropolygon draws patches, and {scene.name} has none")
     points, texture = scene.patches.points, options.texture
     view: dict[str, Any] = {"matrix": matrix, "width": width, "height": height, "simt": simt}
-    tiles = screen_tiles(width, height, options.tile, options.bound)
+    fine = screen_tiles(width, height, options.tile, options.bound)
+    tiles = screen_tiles(width, height, options.coarse, options.bound) if options.coarse else fine
     subpatches = execute(
         bound_and_split, points, **view, bound=options.bound, bound_rule=options.bound_rule, near=options.near,
         min_depth=options.min_depth,
@@ -170,11 +207,22 @@ def micropolygon(
     count, idx = execute(bucket_count, grids.boxes, tiles, simt).outputs
     start = execute(bucket_scan, count, simt).outputs
     lists = execute(bucket_write, grids.boxes, tiles, count, start, idx, simt).outputs
-    pixels, drawn, _ = execute(
-        tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
-        spp=options.spp, box_tests=options.box_tests, edges=options.edges,
-        ids=options.shading == "visible",
-    )  # fmt: skip
+    if options.coarse and not options.has_masks:
+        count, start, lists = execute(refine_buckets, grids.boxes, count, start, lists, tiles, fine, simt).outputs
+        tiles = fine
+    if options.has_masks:
+        buckets = grids.boxes, count, start, lists, tiles, fine
+        pixels, drawn, _ = execute(macro_raster, grids.vertices, *buckets, width, height, simt)
+    elif options.cull != "none":
+        by_depth = options.cull == "sorted"
+        lists_of = count, start, lists, tiles
+        pixels, drawn, _ = execute(culled_raster, grids.vertices, *lists_of, width, height, simt, by_depth=by_depth)
+    else:
+        pixels, drawn, _ = execute(
+            tile_raster, grids.vertices, count, start, lists, tiles, width, height, simt,
+            spp=options.spp, box_tests=options.box_tests, edges=options.edges,
+            ids=options.shading == "visible",
+        )  # fmt: skip
     image = pixels.image
     if options.shading == "visible":
         late: dict[str, Any] = {"side": options.grid, "texture": texture}
@@ -184,7 +232,7 @@ def micropolygon(
     if not execute.picture:
         return Frame.numbers(execute.works, facts, said)
     maps = {} if pixels.overdraw is None else _maps(drawn[0], count, pixels.overdraw, tiles)
-    return Frame(image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=options.tile)
+    return Frame(image, pixels.depth, execute.works, maps=maps, facts=facts, warnings=said, tile=tiles.size)
 
 
 def _dice(
@@ -195,7 +243,7 @@ def _dice(
     execute: Executor,
 ) -> tuple[Grids, Mapping[str, Any]]:
     """Dice by the way of shading; grids, and how many vertices were shaded."""
-    side = options.grid
+    side, shaded = options.grid, len(subpatches.patch) * options.grid**2
     how: dict[str, Any] = {"texture": options.texture, "shaded": execute.picture}
     if options.shading == "visible":
         return execute(dice_positions, points, subpatches, **view, side=side).outputs, {}
@@ -203,8 +251,10 @@ def _dice(
         links = execute(link_grids, subpatches, view["simt"]).outputs
         grids, _, facts = execute(dice_shared, points, subpatches, links, **view, **how, side=side)
         return grids, facts
+    if options.cull != "none":
+        return execute(dice_nearest, points, subpatches, **view, **how).outputs, {"shaded_vertices": shaded}
     grids = execute(dice, points, subpatches, **view, **how, side=side).outputs
-    return grids, {"shaded_vertices": len(subpatches.patch) * side**2}
+    return grids, {"shaded_vertices": shaded}
 
 
 def _maps(

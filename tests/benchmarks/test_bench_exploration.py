@@ -11,6 +11,9 @@ ROADS = [
     {"grid": 13, "bound": 16.0},
     {"shading": "shared"},
     {"shading": "visible"},
+    {"coarse": 16, "tile": 4},
+    {"cull": "sorted"},
+    {"coarse": 32, "tile": 8, "second_level": "buckets"},
 ]
 
 

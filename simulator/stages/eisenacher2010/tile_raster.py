@@ -55,7 +55,7 @@ _E = TileRasterEvent
 
 
 @kernel(lent=True)
-def _raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
+def raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
     left, top = origin
@@ -123,7 +123,7 @@ def _raster_tiles(
         samples.color[:] = BACKGROUND
         samples.hits[:] = 0
         for k in range(first, first + grids):
-            _raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
+            raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
         resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
         if ids is not None:
             y, x = tile_row * shape.tile, column * shape.tile
@@ -148,12 +148,18 @@ def shared_bytes(shape: BlockShape) -> int:
     return grids * (shape.grid**2 + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
 
 
-def _streams(
-    table: NDArray[np.int64], lists: NDArray[np.uint32], grids: int, shape: BlockShape, simt: Simt, rows: int
+def raster_streams(
+    table: NDArray[np.int64],
+    lists: NDArray[np.uint32],
+    grids: int,
+    shape: BlockShape,
+    simt: Simt,
+    rows: int,
+    others: int = 0,
 ) -> tuple[Stream, ...]:
     """Buffers that the kernel touches, by the rows of all tiles; of ``grids`` those that are in a list.
 
-    Tiles that share a grid are neighbours, at most a row of tiles apart.
+    Tiles that share a grid are neighbours, at most a row of tiles apart. ``others``: bytes that it loads besides.
     """
     total = table.sum(axis=0)
     seen = np.zeros(grids, np.bool_)
@@ -161,7 +167,7 @@ def _streams(
     drawn = int(np.count_nonzero(seen))
     vertex_bytes = int(block_traffic(shape, simt).grid[lists % ALIGNMENTS, 1].sum())
     edge_bytes = len(lists) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
-    rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes
+    rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes - others
     stored, row = int(total[_E.STORE_BYTES]), max(SECTOR_BYTES, shape.tile * WORD_BYTES)
     streams = [
         Stream("grids", "load", vertex_bytes, drawn * shape.grid**2 * VECTOR_BYTES, 2 * vertex_bytes // rows),
@@ -258,5 +264,5 @@ def tile_raster(
     pixels = Pixels(image if seen is None else seen, depth, overdraw)
     if table is None:
         return StageResult(pixels)
-    streams = _streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
+    streams = raster_streams(table, lists, len(vertices), shape, simt, -(-tiles.total // tiles.columns))
     return StageResult(pixels, (raster_work(shape, table, streams, ids=ids),))

@@ -5,6 +5,7 @@ quads of a batch with all its warps.
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -77,6 +78,13 @@ class TileRasterEvent(IntEnum):
 
 
 _E = TileRasterEvent
+
+
+def events_with(name: str, in_place: Mapping[TileRasterEvent, str], more: Sequence[str]) -> Any:
+    """Events of a kernel that does more than the tile raster: some in place of events that it has not, and further."""
+    names = [*(in_place.get(event, event.name) for event in TileRasterEvent), *more]
+    made: Any = IntEnum
+    return made(name, names, start=0, module=__name__)
 
 
 class BlockShape(NamedTuple):
