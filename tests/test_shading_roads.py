@@ -2,10 +2,17 @@
 
 import pytest
 
-from tilestamp.experiments.exploration import compaction, derivatives, quad_merging
+from tilestamp.experiments.exploration import compaction, decoupled, derivatives, quad_merging
 from tilestamp.experiments.harness.write import draw_figure
 
 SMALL = {
+    decoupled: {
+        "SIDE": 24,
+        "SAMPLES": 4,
+        "AREAS": (10.0, 100.0),
+        "CACHES": (1, 16, 1024),
+        "FRAME": {"width": 32, "height": 24, "edge": 8.0},
+    },
     compaction: {"SIDE": 32, "LAYERS": (1, 4), "SHARES": (0.0, 0.75)},
     derivatives: {"TILTS": (0.0, 0.8, 0.95), "AREAS": (4.0, 100.0), "WIDTH": 48, "HEIGHT": 36},
     quad_merging: {

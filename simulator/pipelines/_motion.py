@@ -1,4 +1,4 @@
-"""What interval and interleaved share: options of shutter and lens, and the micropolygons as they move."""
+"""What interval and interleaved share: shutter and lens, the micropolygons as they move, and how they are shaded."""
 
 from typing import Annotated, Any
 
@@ -6,11 +6,15 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.pipelines._micropolygons import DicedInput
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons, micropolygons
-from tilestamp.simulator.stages.fatahalian2009.motion import MovingMicropolygons, moved
+from tilestamp.simulator.stages.fatahalian2009.motion import BlurPattern, MovingMicropolygons, blur_samples, moved
 from tilestamp.simulator.stages.fatahalian2009.thin_lens import defocus
+from tilestamp.simulator.stages.ragankelley2011.decoupled_shading import Shading, decoupled_shading
 
 
 class MotionInput(DicedInput, frozen=True, kw_only=True):
@@ -26,6 +30,14 @@ class MotionInput(DicedInput, frozen=True, kw_only=True):
     """Radius in pixels of the circle of confusion of what is infinitely far: 0 is a pinhole."""
     focus: Annotated[float, Meta(gt=0)] | None = None
     """Distance from the eye of what is sharp, in model units; none: the mean of the vertices."""
+    shade_cache: Annotated[int, Meta(ge=1, le=1024)] | None = None
+    """Shade visible samples, and keep so many shading cells for others to share; none: shading is no part of the
+    frame."""
+    shading_rate: Annotated[float, Meta(gt=0, le=16)] = 1.0
+    """Shading cells along a pixel."""
+    decoupled: bool = True
+    """Samples share the cell where their point lies at rest, seen through the middle of the lens; or that of their own
+    pixel, as multisampling does."""
 
 
 def moving_micropolygons(
@@ -37,3 +49,18 @@ def moving_micropolygons(
     blur = defocus(still, np.eye(4) if flat else matrix, width, height, options.focus, options.lens)
     angle = np.radians(options.direction)
     return still, moved(still, options.motion * np.array([np.cos(angle), -np.sin(angle)]), blur)
+
+
+def shade(
+    execute: Executor,
+    moving: MovingMicropolygons,
+    pattern: BlurPattern,
+    options: MotionInput,
+    samples: Samples,
+    simt: Simt,
+) -> None:
+    """Shade the visible samples, where that is part of the frame."""
+    if options.shade_cache is not None:
+        shading = Shading(options.shading_rate, options.shade_cache, options.decoupled)
+        again = blur_samples(samples.width, samples.height, pattern)
+        execute(decoupled_shading, moving, pattern, again, shading, simt)

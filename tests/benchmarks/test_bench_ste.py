@@ -10,10 +10,12 @@ from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide,
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, moved, stratified_pattern
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
 from tilestamp.simulator.stages.fatahalian2010.quad_shading import quad_shading
+from tilestamp.simulator.stages.ragankelley2011.decoupled_shading import Shading, decoupled_shading
 
 MICROQUADS = 4_000_000
 WIDTH, HEIGHT = 1600, 1200
@@ -61,3 +63,13 @@ def test_draw_a_moving_defocused_teapot_in_tiles(benchmark, bounds):
     benchmark(
         simulate, "teapot", "stochastic", width=320, height=240, fidelity="counts", edge=8.0, motion=16.0, bounds=bounds
     )
+
+
+@pytest.mark.parametrize("cache", [16, 1024])
+def test_shade_moving_triangles_through_a_cache(benchmark, cache):
+    moving, pattern = moved(quad_merging.mesh(100.0, 96), (8.0, 0.0), 1.0), stratified_pattern(4)
+
+    def draw():
+        decoupled_shading(moving, pattern, blur_samples(96, 96, pattern), Shading(1.0, cache, True), Simt())
+
+    benchmark(draw)

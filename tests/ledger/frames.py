@@ -132,6 +132,8 @@ GENERATED_FRAMES = (
     Frame("hardware", SOUP, "gtx480", {}),
     *(Frame("stamps", SOUP, machine, {"coarse": 16, "spp": 4}) for machine in MIXED),
     Frame("stamps", EYE, "h200", {"edge": 4.0}),
+    Frame("interval", EYE, "h200", {"edge": 8.0, "shade_cache": 16}),
+    Frame("interleaved", EYE, "h200", {"edge": 8.0, "shade_cache": 64, "decoupled": False}),
     *(Frame("stamps", EYE, machine, {"edge": 4.0, "spp": 4, "merge_entries": 32}) for machine in MIXED),
     *(Frame("across-polygons", SOUP, machine, {"packing": "sorted"}) for machine in MIXED),
     Frame("across-polygons", EYE, "h200", {"packing": "repacked", "edge": 4.0, "triangles": True}),

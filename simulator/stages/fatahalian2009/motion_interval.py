@@ -99,7 +99,7 @@ def _motion_interval(
             row[MotionEvent.BOX_WARPS] += 1
             row[MotionEvent.BOXES] += last - first
             for p in range(first, last):
-                boxes[p - first, :] = _bound(start, end, blur, p, intervals[n], samples)
+                boxes[p - first, :] = bound(start, end, blur, p, intervals[n], samples)
             low, high = n * spp // count, (n + 1) * spp // count
             entries[0] += _walk(start, end, blur, first, last, boxes, pattern, samples, simt, row, low, high)
 
@@ -142,7 +142,7 @@ def _walk(
 
 
 @kernel
-def _bound(start: Any, end: Any, blur: Any, p: int, interval: Any, samples: Samples) -> tuple[int, int, int, int]:
+def bound(start: Any, end: Any, blur: Any, p: int, interval: Any, samples: Samples) -> tuple[int, int, int, int]:
     """Pixels x0, y0, x1, y1 that the polygon may reach in an interval, on screen."""
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for k in range(start.shape[1]):

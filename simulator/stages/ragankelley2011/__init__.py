@@ -1,0 +1,1 @@
+"""Ragan-Kelley et al. 2011: decoupled sampling."""
