@@ -18,7 +18,7 @@ from tilestamp.simulator.pipelines import load_pipeline, options_type, pipeline_
 from tilestamp.simulator.work import Work
 
 SIZE = {"width": 320, "height": 240}
-SCENES = {"tiled": "spot", "per-primitive": "spot", "binned": "spot"}  # textured ones
+SCENES = {"tiled": "spot", "per-primitive": "spot", "binned": "spot", "splat": "playbot"}  # textured ones; splats
 INTRODUCTION = """# Pipelines
 
 Each pipeline executes a published rasterizer's stages as its CUDA original does, counts what they do, and makes the

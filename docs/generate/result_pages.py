@@ -21,7 +21,7 @@ from tilestamp.experiments.harness.registry import describe, describe_folder, ex
 
 RESULTS = "TILESTAMP_RESULTS"  # names what `tilestamp reproduce -o FOLDER` left
 ATLAS, ROADS = "stability", "exploration"
-RESULT = re.compile(r"<!-- result (exploration/\w+) -->")
+RESULT = re.compile(r"<!-- result (exploration/[a-z]\w*) -->")  # not the NAME of an explanation
 EXPERIMENTS_HEAD = """# Experiments
 
 Each compares published or measured cells with ours, cell by cell, or answers a question.
