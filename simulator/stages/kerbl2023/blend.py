@@ -32,6 +32,7 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import (
     GX,
     LANES,
     LAST,
+    LEAST_ENTRY_POWER,
     RED,
     ROWS,
     TRANSMITTANCE,
@@ -39,7 +40,16 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import (
     X,
     Y,
 )
-from tilestamp.simulator.stages.kerbl2023.blend_walk import BOX, PER_ROUND, TOTALS, reach_box, walk
+from tilestamp.simulator.stages.kerbl2023.blend_walk import (
+    BOX,
+    LEAST_POWER,
+    PER_ROUND,
+    REACH,
+    TOTALS,
+    reach_box,
+    visible_reach,
+    walk,
+)
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
@@ -48,7 +58,7 @@ from tilestamp.simulator.work import Work
 
 SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
 COLOURS, PLANES = 3, 5  # floats that a blend reads; words that a pixel stores
-_PART = 8  # tiles, at least
+_PART, _PART_GAUSSIANS = 8, 1 << 14  # tiles and Gaussians of one call, at least
 _E = BlendEvent
 
 
@@ -71,7 +81,7 @@ class Pixels(NamedTuple):
 
 
 @kernel(lent=True)
-def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, room: Room) -> None:
+def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
     """Gather the entries of a tile."""
     for k in range(count):
         i = listed[first + k]
@@ -81,7 +91,8 @@ def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, roo
             entry[A + j] = out.conics[i, j]
         for j in range(COLOURS):
             entry[ENTRY_RED + j] = colours[i, j]
-        reach_box(entry, room.boxes[k])
+        entry[LEAST_ENTRY_POWER] = reaches[i, LEAST_POWER]
+        reach_box(out.positions[i, 0], out.positions[i, 1], reaches[i], room.boxes[k])
 
 
 @kernel(lent=True)
@@ -158,8 +169,8 @@ def _tile(
             if row is not None:
                 row[_E.STEPS] += totals[group.TRIPS]
                 row[_E.EVALUATIONS] += totals[group.EVALUATIONS]
-                row[_E.EXP_STEPS] += totals[group.EXP_STEPS]
-                row[_E.EXP_LANES] += totals[group.EXP_LANES]
+                row[_E.EXP_STEPS] += totals[group.BOUNDED_STEPS]
+                row[_E.EXP_LANES] += totals[group.EVALUATIONS] - totals[group.SKIPPED_POWER]
                 row[_E.BLEND_STEPS] += totals[group.BLEND_STEPS]
                 row[_E.BLENDED] += totals[group.BLENDED]
                 row[_E.SKIPPED_POWER] += totals[group.SKIPPED_POWER]
@@ -167,9 +178,17 @@ def _tile(
 
 
 @kernel
+def _reach(part: int, parts: int, out: Projected, reaches: Any) -> None:
+    """Find how far the Gaussians of a part may be seen."""
+    for i in range(len(reaches) * part // parts, len(reaches) * (part + 1) // parts):
+        if out.radii[i]:
+            visible_reach(out.conics[i], reaches[i])
+
+
+@kernel
 def _blend(
-    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, tiles: Tiles,
-    block: Block, background: Any, pixels: Pixels, table: Any,
+    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, reaches: Any,
+    tiles: Tiles, block: Block, background: Any, pixels: Pixels, table: Any,
 ) -> None:  # fmt: skip
     """Blend a part of the tiles; row i of the table is that of the i-th of them."""
     begin, end = len(drawn) * part // parts, len(drawn) * (part + 1) // parts
@@ -178,7 +197,7 @@ def _blend(
         longest = max(longest, starts[drawn[i] + 1] - starts[drawn[i]])
     lanes = block.parts * LANES
     room = Room(
-        np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int64), np.empty((ROWS, lanes), np.float32),
+        np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int32), np.empty((ROWS, lanes), np.float32),
         np.empty(block.parts, np.uint32),
         np.empty((block.warps, block.pixels, longest // block.threads + 1, PER_ROUND), np.int64),
         np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint32),
@@ -188,7 +207,7 @@ def _blend(
         tile = drawn[i]
         first, count = starts[tile], starts[tile + 1] - starts[tile]
         row = None if table is None else table[i]
-        _load(first, count, listed, out, colours, room)
+        _load(first, count, listed, out, colours, reaches, room)
         _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
@@ -241,7 +260,9 @@ def blend(
     pixels = Pixels(np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32))
     block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
-    inputs = (starts, listed, projected, colours, tiles, block, over, pixels, table)
+    reaches = np.empty((len(colours), REACH), np.float32)
+    for_parts(_reach, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
+    inputs = (starts, listed, projected, colours, reaches, tiles, block, over, pixels, table)
     for_parts(_blend, parts_of(tiles.total, _PART), np.arange(tiles.total), *inputs)
     return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
 

@@ -31,7 +31,7 @@ from tilestamp.simulator.stages.laine2011.exact import fma
 
 LANES = 32
 X, Y, TRANSMITTANCE, RED, GREEN, BLUE, LAST, ROWS = range(8)  # rows of the state; LAST holds an integer's bits
-GX, GY, A, B, C, OPACITY, ENTRY_RED, ENTRY_GREEN, ENTRY_BLUE, ENTRY = range(10)  # columns of an entry
+GX, GY, A, B, C, OPACITY, ENTRY_RED, ENTRY_GREEN, ENTRY_BLUE, LEAST_ENTRY_POWER, ENTRY = range(11)  # of an entry
 MOST_ALPHA, LEAST_ALPHA, OPAQUE = np.float32(0.99), np.float32(1) / np.float32(255), np.float32(0.0001)
 
 
@@ -49,7 +49,7 @@ def blend_step(state: Any, lasts: Any, first: int, alive: Any, entry: Any, numbe
     alive : uint32
         Pixels that are not done, a bit each.
     entry : ndarray, (ENTRY,), float32
-        Position, conic, opacity, colour.
+        Position, conic, opacity, colour, and a power below which alpha is known to be too small.
     number : int
         Of the entry in its list, from 1.
 
@@ -182,27 +182,29 @@ def _step(builder: Any, base: Any, stride: Any, alive: Any, entry: Any, number: 
     power = v.fma(inner, v.all(-0.5, floats), b.fneg(b.fmul(dy, b.fmul(dx, e[B]))))
     living = b.bitcast(alive, bits)
     bounded = b.fcmp_unordered("<=", power, v.all(0.0, floats))
-    product = b.fmul(e[OPACITY], v.exp(power))
-    most = v.all(float(MOST_ALPHA), floats)
-    alpha = b.select(b.fcmp_ordered("<", product, most), product, most)
-    seen = b.and_(b.and_(living, bounded), b.fcmp_unordered(">=", alpha, v.all(float(LEAST_ALPHA), floats)))
+    near = b.and_(living, b.and_(bounded, b.fcmp_unordered(">=", power, e[LEAST_ENTRY_POWER])))
     unbounded = b.bitcast(b.and_(living, b.not_(bounded)), word)
     results = [cgutils.alloca_once_value(b, ir.Constant(word, 0)) for _ in range(2)]
-    with b.if_then(b.icmp_unsigned("!=", b.bitcast(seen, word), ir.Constant(word, 0))):
+    with b.if_then(b.icmp_unsigned("!=", b.bitcast(near, word), ir.Constant(word, 0))):
+        product, most = b.fmul(e[OPACITY], v.exp(power)), v.all(float(MOST_ALPHA), floats)
+        alpha = b.select(b.fcmp_ordered("<", product, most), product, most)
+        alpha = b.select(b.fcmp_unordered("uno", power, power), most, alpha)
+        seen = b.and_(near, b.fcmp_unordered(">=", alpha, v.all(float(LEAST_ALPHA), floats)))
         before = load(TRANSMITTANCE)
         left = b.fmul(before, b.fsub(v.all(1.0, floats), alpha))
         ends = b.and_(seen, b.fcmp_ordered("<", left, v.all(float(OPAQUE), floats)))
         blends = b.and_(seen, b.not_(ends))
-        for k in range(3):
-            old = load(RED + k)
-            new = v.fma(before, b.fmul(alpha, e[ENTRY_RED + k]), old)
-            b.store(b.select(blends, new, old), place(RED + k), align=4)
-        b.store(b.select(blends, left, before), place(TRANSMITTANCE), align=4)
-        whole = ir.VectorType(word, LANES)
-        old = b.load(place(LAST, whole), align=4)
-        b.store(b.select(blends, v.spread(number, whole), old), place(LAST, whole), align=4)
         b.store(b.bitcast(blends, word), results[0])
         b.store(b.bitcast(ends, word), results[1])
+        with b.if_then(b.icmp_unsigned("!=", b.bitcast(blends, word), ir.Constant(word, 0))):
+            for k in range(3):
+                old = load(RED + k)
+                new = v.fma(before, b.fmul(alpha, e[ENTRY_RED + k]), old)
+                b.store(b.select(blends, new, old), place(RED + k), align=4)
+            b.store(b.select(blends, left, before), place(TRANSMITTANCE), align=4)
+            whole = ir.VectorType(word, LANES)
+            old = b.load(place(LAST, whole), align=4)
+            b.store(b.select(blends, v.spread(number, whole), old), place(LAST, whole), align=4)
     return b.load(results[0]), b.load(results[1]), unbounded
 
 

@@ -1,9 +1,9 @@
 """The GPU's own exp, bit for bit: its special function unit raises 2 to a power by a table and a truncated square.
 
-Compiled expf takes the power of 2 apart: a whole number, by a sum that is rounded down, and a rest r from 0 to 1 of which
-the unit gives 2**r. The unit looks at 23 bits behind the point: the first 6 choose a row of three tables (of 27, 16 and
-10 bits), the other 17 are x in c0 + c1 x + c2 x**2 (Oberman & Siu 2005). Of the square it adds up only products of bits
-from column 19 on, and so loses some.
+Compiled expf takes the power of 2 apart: a whole number, by a sum that is rounded down, and a rest r from 0 to 1, of
+which the unit gives 2**r. The unit looks at 23 bits behind the point: the first 6 choose a row of three tables (of 27,
+16 and 10 bits), the other 17 are x in c0 + c1 x + c2 x**2 (Oberman & Siu 2005). Of the square it adds up only products
+of bits from column 19 on, and so loses some.
 
 The tables were solved for from all 2**23 outputs of an H200, and each of these is met; so is expf of an H200 at all of
 the 188,000,000 floats from -6 to -1e-6, and its decisions and pictures are the same to the bit.
