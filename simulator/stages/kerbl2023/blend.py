@@ -96,51 +96,51 @@ def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, rea
 
 
 @kernel(lent=True)
-def _place(tile: int, tiles: Tiles, block: Block, slot: int, warp: int, room: Room) -> Any:
-    """Set up the pixels of a warp: coordinates, who is on the screen; gives the rectangle around them."""
-    left = tile % tiles.columns * tiles.tile_x
-    top = tile // tiles.columns * tiles.tile_y
-    first = slot * block.threads + warp * block.warp
-    end = min(first + block.warp, (slot + 1) * block.threads)
+def _place(tile: int, tiles: Tiles, first: int, end: int, room: Room) -> Any:
+    """Set up pixels of a tile: coordinates, who is on the screen; gives the rectangle around them."""
+    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
     room.state[:] = 0
     room.alive[:] = 0
-    for lane in range(end - first):
-        x, y = left + (first + lane) % tiles.tile_x, top + (first + lane) // tiles.tile_x
-        room.state[X, lane], room.state[Y, lane] = x, y
-        room.state[TRANSMITTANCE, lane] = 1
-        if x < tiles.width and y < tiles.height:
-            room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
-    columns = min(end - first, tiles.tile_x)
-    x = left + first % tiles.tile_x
-    return x, x + columns - 1, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
+    p = first
+    while p < end:
+        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
+        run = min(left + tiles.tile_x - x, end - p)
+        for lane in range(p - first, p - first + run):
+            room.state[X, lane], room.state[Y, lane] = x, y
+            room.state[TRANSMITTANCE, lane] = 1
+            if x < tiles.width and y < tiles.height:
+                room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
+            x += 1
+        p += run
+    x, last = left + first % tiles.tile_x, min(end - first, tiles.tile_x) - 1
+    return x, x + last, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
 
 
 @kernel(lent=True)
 def _store(
-    tile: int, tiles: Tiles, block: Block, slot: int, warp: int, background: Any, room: Room, pixels: Pixels, row: Any
+    tile: int, tiles: Tiles, first: int, end: int, segment: int, background: Any, room: Room, pixels: Pixels, row: Any
 ) -> None:
-    """Store the pixels of a warp; count the sectors, of each row of pixels by itself."""
-    left = tile % tiles.columns * tiles.tile_x
-    top = tile // tiles.columns * tiles.tile_y
-    first = slot * block.threads + warp * block.warp
-    end = min(first + block.warp, (slot + 1) * block.threads)
+    """Store the pixels of a warp; count the sectors of each row of pixels by itself."""
+    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
     lasts = room.state.view(np.int32)
-    stored = 0
-    for p in range(first, end):
-        x, y, lane = left + p % tiles.tile_x, top + p // tiles.tile_x, p - first
-        if x >= tiles.width or y >= tiles.height:
-            continue
-        transmittance = room.state[TRANSMITTANCE, lane]
-        for k in range(COLOURS):
-            pixels.colours[y, x, k] = fma(background[k], transmittance, room.state[RED + k, lane])
-        pixels.transmittance[y, x] = transmittance
-        pixels.reached[y, x] = lasts[LAST, lane]
-        stored += 1
-        if row is not None:
+    stored, p = 0, first
+    while p < end:
+        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
+        run = min(left + tiles.tile_x - x, end - p)
+        shown = max(min(run, tiles.width - x), 0) if y < tiles.height else 0
+        for i in range(shown):
+            lane = p - first + i
+            transmittance = room.state[TRANSMITTANCE, lane]
+            for k in range(COLOURS):
+                pixels.colours[y, x + i, k] = fma(background[k], transmittance, room.state[RED + k, lane])
+            pixels.transmittance[y, x + i] = transmittance
+            pixels.reached[y, x + i] = lasts[LAST, lane]
+        if row is not None and shown:
             for plane in range(PLANES):
                 word = max(plane - 2, 0) * tiles.width * tiles.height + y * tiles.width + x
-                begins = p == first or p % tiles.tile_x == 0 or word * 4 % block.segment == 0
-                row[_E.STORE_TRANSACTIONS] += begins
+                row[_E.STORE_TRANSACTIONS] += ((word + shown) * 4 - 1) // segment - word * 4 // segment + 1
+        stored += shown
+        p += run
     if row is not None:
         row[_E.PIXELS] += stored
         row[_E.PIXEL_WARPS] += stored > 0
@@ -159,13 +159,15 @@ def _tile(
     for warp in range(block.warps):
         bit = np.uint32(1) << np.uint32(warp)
         for slot in range(block.pixels):
-            rectangle = _place(tile, tiles, block, slot, warp, room)
+            begin = slot * block.threads + warp * block.warp
+            end = min(begin + block.warp, (slot + 1) * block.threads)
+            rectangle = _place(tile, tiles, begin, end, room)
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
                 room.rounds[warp, slot], room.marks, bit, totals,
             )  # fmt: skip
-            _store(tile, tiles, block, slot, warp, background, room, pixels, row)
+            _store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
             if row is not None:
                 row[_E.STEPS] += totals[group.TRIPS]
                 row[_E.EVALUATIONS] += totals[group.EVALUATIONS]
