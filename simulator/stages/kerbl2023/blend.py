@@ -219,7 +219,8 @@ def _blend(
             for size in range(0, row[_E.ENTRIES], block.threads):
                 row[_E.GATHER_WARPS] += (min(block.threads, row[_E.ENTRIES] - size) + block.warp - 1) // block.warp
             gathers = gather_sectors(first, row[_E.ENTRIES], listed, block, room)
-            row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + block.warps
+            once = block.warps + COLOURS * row[_E.PIXEL_WARPS]  # ends of the list, background
+            row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + once
             row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * block.segment
             row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * block.segment
 

@@ -25,6 +25,7 @@ from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 KEY_BYTES, VALUE_BYTES = 8, 4
+UNROLLED = 4  # tiles of the loop over columns
 _MOST = 2**31  # pairs: offsets are 32 bits wide
 _PART = 1 << 13  # Gaussians, at least
 _E = DuplicateEvent
@@ -46,8 +47,8 @@ class Pairs(NamedTuple):
 
 
 @kernel(lent=True)
-def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, values: Any) -> int:
-    """Write the pairs of one Gaussian; gives its rows."""
+def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, values: Any, widths: Any) -> int:
+    """Write the pairs of one Gaussian; gives its rows, and ``widths`` the tiles of each."""
     conic = out.conics[i]
     x, y, radius = out.positions[i, 0], out.positions[i, 1], out.radii[i]
     reach = cut_off(conic) if rule != SQUARE else (np.float32(0), np.float32(0), np.float32(0))
@@ -55,6 +56,7 @@ def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, 
     depth = np.uint64(out.depths.view(np.uint32)[i])
     for row in range(first_row, last_row + 1):
         first, last = tile_columns(rule, row, x, y, radius, reach, conic, tiles)
+        widths[row - first_row] = max(0, last - first + 1)
         for column in range(first, last + 1):
             keys[at] = (np.uint64(row * tiles.columns + column) << np.uint64(32)) | depth
             values[at] = i
@@ -64,32 +66,39 @@ def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, 
 
 
 @kernel(lent=True)
-def _count_trips(first: int, lanes: int, trips: int, begins: Any, sizes: Any, segment: int, row: Any) -> None:
-    """Sectors of the loop over tiles: in each trip a depth is loaded, a key and an index stored."""
-    loads, stores = 0, 0
-    for trip in range(trips):
+def _count_row(first: int, lanes: int, r: int, tight: bool, begins: Any, widths: Any, segment: int, row: Any) -> None:
+    """Sectors of one row of tiles: a key and an index stored for each tile, and a depth loaded by the published rule.
+
+    The loop over columns is compiled in fours, behind one for what is left over: lanes of other widths take turns.
+    """
+    fours = rest = 0
+    for lane in range(lanes):
+        fours = max(fours, widths[lane, r] // UNROLLED)
+        rest = max(rest, widths[lane, r] % UNROLLED)
+    loads = stores = 0
+    for step in range(rest + UNROLLED * fours):
         key, value, depth = -1, -1, -1
         for lane in range(lanes):
-            if trip < sizes[lane]:
-                here = (begins[lane] + trip) * KEY_BYTES // segment
-                stores += here != key
-                key = here
-                here = (begins[lane] + trip) * VALUE_BYTES // segment
-                stores += here != value
-                value = here
-                here = (first + lane) * 4 // segment
-                loads += here != depth
-                depth = here
-    row[_E.LOAD_TRANSACTIONS] += loads
+            width = widths[lane, r]
+            if step < width % UNROLLED if step < rest else (step - rest) // UNROLLED < width // UNROLLED:
+                at = begins[lane]
+                begins[lane] = at + 1
+                stores += (at * KEY_BYTES // segment != key) + (at * VALUE_BYTES // segment != value)
+                key, value = at * KEY_BYTES // segment, at * VALUE_BYTES // segment
+                loads += (first + lane) * 4 // segment != depth
+                depth = (first + lane) * 4 // segment
+    row[_E.STEPS] += rest + UNROLLED * fours
     row[_E.STORE_TRANSACTIONS] += stores
+    if not tight:
+        row[_E.LOAD_TRANSACTIONS] += loads
 
 
 @kernel(lent=True)
 def _count_warp(
-    first: int, lanes: int, begins: Any, sizes: Any, rows: Any, radii: Any, tight: bool, active: Any, segment: int,
-    row: Any,
+    first: int, lanes: int, begins: Any, sizes: Any, rows: Any, widths: Any, radii: Any, tight: bool, active: Any,
+    segment: int, row: Any,
 ) -> None:  # fmt: skip
-    """Events of one warp: of each lane where its pairs begin, how many they are, and its rows of tiles."""
+    """Events of one warp: of each lane where its pairs begin, how many they are, its rows of tiles, their widths."""
     visible, trips, row_trips = 0, 0, 0
     for lane in range(lanes):
         active[lane] = 1
@@ -109,9 +118,19 @@ def _count_warp(
     row[_E.TRIPS] += trips
     row[_E.LONGEST_TRIPS] = max(row[_E.LONGEST_TRIPS], trips)
     row[_E.LONGEST_ROW_TRIPS] = max(row[_E.LONGEST_ROW_TRIPS], row_trips)
-    for k in range(3 if tight else 2):  # offset, position, conic
-        row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 4 << k, 1, 4 << k, segment)
-    _count_trips(first, lanes, trips, begins, sizes, segment, row)
+    if first == 0:
+        active[0] = 0  # which adds up from nothing
+    row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first - 1, 4, 1, 4, segment)  # where the one before ends
+    if first == 0:
+        active[0] = radii[0] > 0
+    row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 8, 1, 8, segment)
+    if tight:  # conic and depth
+        row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 16, 1, 16, segment)
+        row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 4, 1, 4, segment)
+    for r in range(row_trips):
+        for lane in range(lanes):
+            widths[lane, r] = widths[lane, r] if r < rows[lane] else 0
+        _count_row(first, lanes, r, tight, begins, widths, segment, row)
 
 
 @kernel
@@ -124,6 +143,7 @@ def _duplicate(
     blocks = (count + BLOCK - 1) // BLOCK
     rows, active = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
     begins, sizes = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
+    widths = np.zeros((warp, tiles.rows), np.int64)
     for block in range(blocks * part // parts, blocks * (part + 1) // parts):
         end = min((block + 1) * BLOCK, count)
         for first in range(block * BLOCK, end, warp):
@@ -134,10 +154,10 @@ def _duplicate(
                 sizes[lane] = ends[i] - begins[lane]
                 rows[lane] = 0
                 if out.radii[i] > 0:
-                    rows[lane] = _write(i, begins[lane], out, bound, tiles, keys, values)
+                    rows[lane] = _write(i, begins[lane], out, bound, tiles, keys, values, widths[lane])
             if table is not None:
                 tight = bound != SQUARE
-                _count_warp(first, lanes, begins, sizes, rows, out.radii, tight, active, segment, table[block])
+                _count_warp(first, lanes, begins, sizes, rows, widths, out.radii, tight, active, segment, table[block])
         if table is not None:
             row = table[block]
             row[_E.BLOCKS] = 1

@@ -79,6 +79,7 @@ class DuplicateEvent(IntEnum):
     STORE_BYTES = 12
     BLOCKS = 13
     LONGEST_ROW_TRIPS = 14  # of the warp with most
+    STEPS = 15  # pairs stored by a warp, an instruction each: lanes whose rows differ in width take turns
 
 
 class SortEvent(IntEnum):

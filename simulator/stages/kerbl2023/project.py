@@ -37,12 +37,12 @@ BLOCK = 256  # threads
 # is a store, bytes of a record, instructions, and the bytes of each. A matrix is the same for all lanes.
 ACCESSES = (
     (0, 0, 12, 3, 4), (0, 1, 4, 1, 4), (0, 1, 4, 1, 4), (0, 0, 0, 4, 4),
-    (1, 0, 0, 28, 4), (1, 0, 12, 3, 4), (1, 0, 16, 4, 4), (1, 1, 24, 6, 4),
+    (1, 0, 0, 24, 4), (1, 0, 12, 3, 4), (1, 0, 12, 3, 4), (1, 0, 16, 4, 4), (1, 1, 24, 6, 4), (1, 0, 24, 5, 4),
     (3, 1, 4, 1, 4), (3, 1, 4, 1, 4), (3, 1, 4, 1, 4), (3, 1, 8, 1, 8), (3, 0, 4, 1, 4), (3, 1, 16, 1, 16),
 )  # fmt: skip
 BUFFERS = (
     "means", "radii", "tiles", "matrices",
-    "matrices", "scales", "rotations", "cov3d",
+    "matrices", "means", "scales", "rotations", "cov3d", "cov3d",
     "radii", "tiles", "depths", "positions", "opacities", "conics",
 )  # fmt: skip
 _PART = 1 << 14  # Gaussians, at least
