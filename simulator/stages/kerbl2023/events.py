@@ -40,7 +40,7 @@ class TightCountEvent(IntEnum):
     """Events of a block of 256 threads that counts the tiles of its Gaussians by box or ellipse."""
 
     WARPS = 0
-    GAUSSIANS = 1
+    LANES = 1
     VISIBLE_WARPS = 2  # with a lane of radius > 0
     VISIBLE_LANES = 3
     OPAQUE_WARPS = 4  # with a lane whose opacity reaches 1/255: extents

@@ -62,7 +62,7 @@ def _tight_count(
         if table is not None:
             row = table[i // BLOCK]
             row[_E.WARPS] += 1
-            row[_E.GAUSSIANS] += lanes
+            row[_E.LANES] += lanes
             row[_E.VISIBLE_WARPS] += visible > 0
             row[_E.VISIBLE_LANES] += visible
             row[_E.OPAQUE_WARPS] += opaque > 0
@@ -121,7 +121,7 @@ def tight_count(
 
 def tight_count_work(table: NDArray[np.int64], bound: str) -> Work:
     """Work of the kernel, from the rows of its blocks."""
-    lanes, visible = (int(table[:, event].sum()) for event in (_E.GAUSSIANS, _E.VISIBLE_LANES))
+    lanes, visible = (int(table[:, event].sum()) for event in (_E.LANES, _E.VISIBLE_LANES))
     return Work(
         stage="project",
         kernel="tight_count",
