@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 from msgspec import Meta
 
 from tilestamp.models.errors import TilestampError
@@ -20,6 +21,7 @@ from tilestamp.simulator.scenes.camera import clip_matrix
 from tilestamp.simulator.scenes.camera_files import CameraSource
 from tilestamp.simulator.scenes.pinhole import pinhole_camera
 
+SIZE = 1024, 768  # pixels, where neither is given nor known
 BYTES_PER_PIXEL = 64  # working memory of the hungriest pipeline: frame buffers, maps, tile lists
 
 
@@ -28,8 +30,8 @@ def simulate(
     pipeline: str = "micropolygon",
     machine: Machine | str | Path = "gtx280",
     *,
-    width: int = 1024,
-    height: int = 768,
+    width: int | None = None,
+    height: int | None = None,
     camera: CameraSource = None,
     fidelity: Fidelity = "schedule",
     counting: bool = True,
@@ -46,8 +48,8 @@ def simulate(
         See ``tilestamp list pipelines``.
     machine : Machine, str or Path
         A machine, a name, or a machine file.
-    width, height : int
-        Pixels.
+    width, height : int, optional
+        Pixels; without either, those of a camera that has some, else 1024 and 768.
     camera : optional
         A view's name, a ``LookAt``, a 4x4 model-to-clip matrix (row-major, column vectors), or a JSON file; the
         scene's default view if not given.
@@ -69,8 +71,14 @@ def simulate(
     TilestampError
         Bad input, in one sentence.
     """
-    drawing = Drawing(width=width, height=height, fidelity=fidelity, counting=counting, picture=picture)
-    width, height, counting = drawing.width, drawing.height, drawing.counting
+    drawing = Drawing(
+        width=SIZE[0] if width is None else width,
+        height=SIZE[1] if height is None else height,
+        fidelity=fidelity,
+        counting=counting,
+        picture=picture,
+    )
+    counting = drawing.counting
     chosen = pipeline_options(pipeline, options)
     machine = load_machine(machine)
     if chosen.votes or (drawing.fidelity != "counts" and counting):
@@ -78,6 +86,10 @@ def simulate(
     scene = load_scene(scene)
     check_scene(pipeline, chosen, scene)
     seen_by = read_camera(camera, scene)
+    own = getattr(seen_by, "size", None)
+    if own and width is None and height is None:
+        drawing = msgspec.structs.replace(drawing, width=own[0], height=own[1])
+    width, height = drawing.width, drawing.height
     matrix = clip_matrix(seen_by, width, height)
     view = pinhole_camera(seen_by, width, height) if chosen.splats else matrix
     execute = Executor(counting=counting, picture=drawing.picture)

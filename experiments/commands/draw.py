@@ -18,6 +18,7 @@ from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 
 PIPELINE = "micropolygon"  # where none is named and the scene has patches
 OF_MESHES = ("cudaraster", "freepipe")  # where it has none: the first that the machine can run
+OF_SPLATS = "splat"  # where it has those
 OF_TEXTURES = ("tiled", "per-primitive")  # the same, where a mesh is to have a texture
 USUAL = "gtx280"  # where no machine is named and it can run the pipeline
 
@@ -29,7 +30,7 @@ class Wanted:
     scene: str
     pipeline: str | None
     machine: str | None
-    size: tuple[int, int]
+    size: tuple[int, int] | None
     camera: str | None = None
     zoom: float = 1.0
     texture: Path | None = None
@@ -79,7 +80,7 @@ def draw(wanted: Wanted, **asked: Any) -> tuple[Run, str]:
     elif image is not None:
         scene = load_scene(wanted.scene, texture=image)
     ours = machine or wanted.described(_machine_for(pipeline))
-    width, height = wanted.size
+    width, height = wanted.size or (None, None)
     run = simulate(scene, pipeline, ours, width=width, height=height, camera=_camera(wanted, scene), **asked, **options)
     return run, _why(wanted, scene, pipeline, ours.identity.name)
 
@@ -89,8 +90,9 @@ def _camera(wanted: Wanted, scene: Scene) -> Any:
     if wanted.zoom == 1.0:
         return wanted.camera
     from tilestamp.simulator.scenes.camera_path import moved_camera
+    from tilestamp.simulator.simulation import SIZE
 
-    return moved_camera(read_camera(wanted.camera, scene), *wanted.size, wanted.zoom)
+    return moved_camera(read_camera(wanted.camera, scene), *(wanted.size or SIZE), wanted.zoom)
 
 
 def _machine_for(pipeline: str) -> str:
@@ -102,6 +104,8 @@ def _pipeline_for(scene: Scene, machine: Machine | None, *, textured: bool) -> s
     """The first pipeline that can draw a scene, on the machine if one is named."""
     if scene.patches is not None:
         return PIPELINE
+    if scene.splats is not None:
+        return OF_SPLATS
     fitting = OF_TEXTURES if textured else OF_MESHES
     return next((name for name in fitting if machine is None or _can_run(name, machine)), fitting[0])
 
@@ -117,7 +121,11 @@ def _can_run(pipeline: str, machine: Machine) -> bool:
 def _check_scene(scene: Scene, pipeline: str, wanted: Wanted, machine: Machine | None) -> None:
     """Refuse what the pipeline cannot draw, and name one that can."""
     kind, textured = options_type(pipeline), wanted.texture is not None
-    if kind.patches and scene.patches is None:
+    if kind.splats != (scene.splats is not None):
+        what = (
+            f"draws {'' if kind.splats else 'no '}splats, and {scene.name} has {'none' if kind.splats else 'only them'}"
+        )
+    elif kind.patches and scene.patches is None:
         what = f"draws patches, and {scene.name} has only triangles"
     elif textured and not (kind.patches or kind.textures):
         what = "draws no textures"
@@ -150,7 +158,8 @@ def _why(wanted: Wanted, scene: Scene, pipeline: str, machine: str) -> str:
     """Say what was chosen, where it is not what is usual."""
     said = []
     if wanted.pipeline is None and pipeline != PIPELINE:
-        said.append(f"{scene.name} has triangles and no patches, so {pipeline} draws it (--pipeline chooses another)")
+        what = "splats" if scene.splats is not None else "triangles and no patches"
+        said.append(f"{scene.name} has {what}, so {pipeline} draws it (--pipeline chooses another)")
     if wanted.machine is None and machine != USUAL:
         said.append(f"{USUAL} cannot run {pipeline}, so {machine} does (--machine chooses another)")
     return "; ".join(said)

@@ -24,7 +24,7 @@ def render(
     *,
     pipeline: str | None = None,
     machine: str | None = None,
-    size: str = "1024x768",
+    size: str | None = None,
     camera: str | None = None,
     zoom: float = 1.0,
     texture: Path | None = None,
@@ -54,7 +54,7 @@ def render(
     machine
         See `tilestamp list machines`, or a machine file. If not given, gtx280, or the first that can run the pipeline.
     size
-        WIDTHxHEIGHT in pixels.
+        WIDTHxHEIGHT in pixels; 1024x768, or that of a camera which has one, if not given.
     camera
         A view of the scene by name (`tilestamp list views SCENE`), or a JSON file (`FILE.json`, `FILE.json:KEY`).
     zoom
@@ -96,7 +96,8 @@ def render(
         check_file(trace, "--trace", ".json.gz")
     if (why or tornado or trace or timeline) and (fidelity == "counts" or not counting):
         raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
-    wanted = Wanted(scene, pipeline, machine, parse_size(size), camera, zoom, texture, map_, set_, flags, option)
+    pixels = parse_size(size) if size else None
+    wanted = Wanted(scene, pipeline, machine, pixels, camera, zoom, texture, map_, set_, flags, option)
     asked: dict[str, Any] = {"fidelity": fidelity, "counting": counting}
     with progress(f"drawing {scene}") as say:
         run, chosen = draw(wanted, picture=output is not None, **asked)

@@ -2,15 +2,14 @@
 
 Modelled
 --------
-- The forward pass of the published CUDA sources, operation by operation in float32 with its fused multiply-adds: radii,
-  tiles, positions, conics, sorted lists and the number of entries that each pixel uses are those of an H200.
+- The forward pass of the published CUDA sources, operation by operation in float32 with its fused multiply-adds, and
+  the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.
 
 Not modelled
 ------------
-- The GPU's own exp, which is within 1 ulp of the correctly rounded one here: of 10^8 evaluations about one is blended
-  there and skipped here, or the other way round, and pictures differ by up to 4e-7.
+- The exp of other GPUs, where their special function unit is another one: that of an H200 is used for all.
 - The time in which the host reads the number of pairs, as the fact ``launches that the host waits for``.
 """
 

@@ -32,6 +32,7 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import (
     GX,
     LANES,
     LAST,
+    LEAST_ENTRY_POWER,
     RED,
     ROWS,
     TRANSMITTANCE,
@@ -39,7 +40,16 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import (
     X,
     Y,
 )
-from tilestamp.simulator.stages.kerbl2023.blend_walk import BOX, PER_ROUND, TOTALS, reach_box, walk
+from tilestamp.simulator.stages.kerbl2023.blend_walk import (
+    BOX,
+    LEAST_POWER,
+    PER_ROUND,
+    REACH,
+    TOTALS,
+    reach_box,
+    visible_reach,
+    walk,
+)
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
@@ -48,7 +58,7 @@ from tilestamp.simulator.work import Work
 
 SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
 COLOURS, PLANES = 3, 5  # floats that a blend reads; words that a pixel stores
-_PART = 8  # tiles, at least
+_PART, _PART_GAUSSIANS = 8, 1 << 14  # tiles and Gaussians of one call, at least
 _E = BlendEvent
 
 
@@ -71,7 +81,7 @@ class Pixels(NamedTuple):
 
 
 @kernel(lent=True)
-def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, room: Room) -> None:
+def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
     """Gather the entries of a tile."""
     for k in range(count):
         i = listed[first + k]
@@ -81,55 +91,56 @@ def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, roo
             entry[A + j] = out.conics[i, j]
         for j in range(COLOURS):
             entry[ENTRY_RED + j] = colours[i, j]
-        reach_box(entry, room.boxes[k])
+        entry[LEAST_ENTRY_POWER] = reaches[i, LEAST_POWER]
+        reach_box(out.positions[i, 0], out.positions[i, 1], reaches[i], room.boxes[k])
 
 
 @kernel(lent=True)
-def _place(tile: int, tiles: Tiles, block: Block, slot: int, warp: int, room: Room) -> Any:
-    """Set up the pixels of a warp: coordinates, who is on the screen; gives the rectangle around them."""
-    left = tile % tiles.columns * tiles.tile_x
-    top = tile // tiles.columns * tiles.tile_y
-    first = slot * block.threads + warp * block.warp
-    end = min(first + block.warp, (slot + 1) * block.threads)
+def _place(tile: int, tiles: Tiles, first: int, end: int, room: Room) -> Any:
+    """Set up pixels of a tile: coordinates, who is on the screen; gives the rectangle around them."""
+    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
     room.state[:] = 0
     room.alive[:] = 0
-    for lane in range(end - first):
-        x, y = left + (first + lane) % tiles.tile_x, top + (first + lane) // tiles.tile_x
-        room.state[X, lane], room.state[Y, lane] = x, y
-        room.state[TRANSMITTANCE, lane] = 1
-        if x < tiles.width and y < tiles.height:
-            room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
-    columns = min(end - first, tiles.tile_x)
-    x = left + first % tiles.tile_x
-    return x, x + columns - 1, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
+    p = first
+    while p < end:
+        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
+        run = min(left + tiles.tile_x - x, end - p)
+        for lane in range(p - first, p - first + run):
+            room.state[X, lane], room.state[Y, lane] = x, y
+            room.state[TRANSMITTANCE, lane] = 1
+            if x < tiles.width and y < tiles.height:
+                room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
+            x += 1
+        p += run
+    x, last = left + first % tiles.tile_x, min(end - first, tiles.tile_x) - 1
+    return x, x + last, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
 
 
 @kernel(lent=True)
 def _store(
-    tile: int, tiles: Tiles, block: Block, slot: int, warp: int, background: Any, room: Room, pixels: Pixels, row: Any
+    tile: int, tiles: Tiles, first: int, end: int, segment: int, background: Any, room: Room, pixels: Pixels, row: Any
 ) -> None:
-    """Store the pixels of a warp; count the sectors, of each row of pixels by itself."""
-    left = tile % tiles.columns * tiles.tile_x
-    top = tile // tiles.columns * tiles.tile_y
-    first = slot * block.threads + warp * block.warp
-    end = min(first + block.warp, (slot + 1) * block.threads)
+    """Store the pixels of a warp; count the sectors of each row of pixels by itself."""
+    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
     lasts = room.state.view(np.int32)
-    stored = 0
-    for p in range(first, end):
-        x, y, lane = left + p % tiles.tile_x, top + p // tiles.tile_x, p - first
-        if x >= tiles.width or y >= tiles.height:
-            continue
-        transmittance = room.state[TRANSMITTANCE, lane]
-        for k in range(COLOURS):
-            pixels.colours[y, x, k] = fma(background[k], transmittance, room.state[RED + k, lane])
-        pixels.transmittance[y, x] = transmittance
-        pixels.reached[y, x] = lasts[LAST, lane]
-        stored += 1
-        if row is not None:
+    stored, p = 0, first
+    while p < end:
+        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
+        run = min(left + tiles.tile_x - x, end - p)
+        shown = max(min(run, tiles.width - x), 0) if y < tiles.height else 0
+        for i in range(shown):
+            lane = p - first + i
+            transmittance = room.state[TRANSMITTANCE, lane]
+            for k in range(COLOURS):
+                pixels.colours[y, x + i, k] = fma(background[k], transmittance, room.state[RED + k, lane])
+            pixels.transmittance[y, x + i] = transmittance
+            pixels.reached[y, x + i] = lasts[LAST, lane]
+        if row is not None and shown:
             for plane in range(PLANES):
                 word = max(plane - 2, 0) * tiles.width * tiles.height + y * tiles.width + x
-                begins = p == first or p % tiles.tile_x == 0 or word * 4 % block.segment == 0
-                row[_E.STORE_TRANSACTIONS] += begins
+                row[_E.STORE_TRANSACTIONS] += ((word + shown) * 4 - 1) // segment - word * 4 // segment + 1
+        stored += shown
+        p += run
     if row is not None:
         row[_E.PIXELS] += stored
         row[_E.PIXEL_WARPS] += stored > 0
@@ -148,18 +159,20 @@ def _tile(
     for warp in range(block.warps):
         bit = np.uint32(1) << np.uint32(warp)
         for slot in range(block.pixels):
-            rectangle = _place(tile, tiles, block, slot, warp, room)
+            begin = slot * block.threads + warp * block.warp
+            end = min(begin + block.warp, (slot + 1) * block.threads)
+            rectangle = _place(tile, tiles, begin, end, room)
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
                 room.rounds[warp, slot], room.marks, bit, totals,
             )  # fmt: skip
-            _store(tile, tiles, block, slot, warp, background, room, pixels, row)
+            _store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
             if row is not None:
                 row[_E.STEPS] += totals[group.TRIPS]
                 row[_E.EVALUATIONS] += totals[group.EVALUATIONS]
-                row[_E.EXP_STEPS] += totals[group.EXP_STEPS]
-                row[_E.EXP_LANES] += totals[group.EXP_LANES]
+                row[_E.EXP_STEPS] += totals[group.BOUNDED_STEPS]
+                row[_E.EXP_LANES] += totals[group.EVALUATIONS] - totals[group.SKIPPED_POWER]
                 row[_E.BLEND_STEPS] += totals[group.BLEND_STEPS]
                 row[_E.BLENDED] += totals[group.BLENDED]
                 row[_E.SKIPPED_POWER] += totals[group.SKIPPED_POWER]
@@ -167,9 +180,17 @@ def _tile(
 
 
 @kernel
+def _reach(part: int, parts: int, out: Projected, reaches: Any) -> None:
+    """Find how far the Gaussians of a part may be seen."""
+    for i in range(len(reaches) * part // parts, len(reaches) * (part + 1) // parts):
+        if out.radii[i]:
+            visible_reach(out.conics[i], reaches[i])
+
+
+@kernel
 def _blend(
-    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, tiles: Tiles,
-    block: Block, background: Any, pixels: Pixels, table: Any,
+    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, reaches: Any,
+    tiles: Tiles, block: Block, background: Any, pixels: Pixels, table: Any,
 ) -> None:  # fmt: skip
     """Blend a part of the tiles; row i of the table is that of the i-th of them."""
     begin, end = len(drawn) * part // parts, len(drawn) * (part + 1) // parts
@@ -178,7 +199,7 @@ def _blend(
         longest = max(longest, starts[drawn[i] + 1] - starts[drawn[i]])
     lanes = block.parts * LANES
     room = Room(
-        np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int64), np.empty((ROWS, lanes), np.float32),
+        np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int32), np.empty((ROWS, lanes), np.float32),
         np.empty(block.parts, np.uint32),
         np.empty((block.warps, block.pixels, longest // block.threads + 1, PER_ROUND), np.int64),
         np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint32),
@@ -188,7 +209,7 @@ def _blend(
         tile = drawn[i]
         first, count = starts[tile], starts[tile + 1] - starts[tile]
         row = None if table is None else table[i]
-        _load(first, count, listed, out, colours, room)
+        _load(first, count, listed, out, colours, reaches, room)
         _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
@@ -198,7 +219,8 @@ def _blend(
             for size in range(0, row[_E.ENTRIES], block.threads):
                 row[_E.GATHER_WARPS] += (min(block.threads, row[_E.ENTRIES] - size) + block.warp - 1) // block.warp
             gathers = gather_sectors(first, row[_E.ENTRIES], listed, block, room)
-            row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + block.warps
+            once = block.warps + COLOURS * row[_E.PIXEL_WARPS]  # ends of the list, background
+            row[_E.LOAD_TRANSACTIONS] = gathers + COLOURS * row[_E.BLEND_TRIPS] + once
             row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * block.segment
             row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * block.segment
 
@@ -241,7 +263,9 @@ def blend(
     pixels = Pixels(np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32))
     block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
-    inputs = (starts, listed, projected, colours, tiles, block, over, pixels, table)
+    reaches = np.empty((len(colours), REACH), np.float32)
+    for_parts(_reach, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
+    inputs = (starts, listed, projected, colours, reaches, tiles, block, over, pixels, table)
     for_parts(_blend, parts_of(tiles.total, _PART), np.arange(tiles.total), *inputs)
     return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
 

@@ -34,7 +34,7 @@ class Room(NamedTuple):
     """Working memory of one thread of this computer."""
 
     entries: NDArray[np.float32]  # (longest list, ENTRY)
-    boxes: NDArray[np.int64]
+    boxes: NDArray[np.int32]
     state: NDArray[np.float32]  # (ROWS, lanes)
     alive: NDArray[np.uint32]
     rounds: NDArray[np.int64]  # (warps, pixels a thread, rounds, PER_ROUND)

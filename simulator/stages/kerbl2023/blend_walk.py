@@ -10,48 +10,45 @@ import numpy as np
 
 from tilestamp.models.bits import popcount
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.kerbl2023.blend_step import (
-    GX,
-    GY,
-    LANES,
-    LEAST_ALPHA,
-    OPACITY,
-    A,
-    B,
-    C,
-    blend_step,
-)
+from tilestamp.simulator.stages.kerbl2023.blend_step import LANES, LEAST_ALPHA, blend_step
 
 BOX = 4  # first and last column and row of pixels
-NOWHERE, EVERYWHERE = 1 << 30, 1 << 29
+WIDE, HIGH, LEAST_POWER, REACH = range(4)  # of a Gaussian: half its box, and the power below which alpha is too small
 # Of a group of pixels:
-EVALUATIONS, BLENDED, SKIPPED_POWER, STOPPED, EXP_STEPS, EXP_LANES, BLEND_STEPS, TRIPS, TOTALS = range(9)
+EVALUATIONS, BLENDED, SKIPPED_POWER, STOPPED, BOUNDED_STEPS, BLEND_STEPS, TRIPS, TOTALS = range(8)
 # Of a group in a round:
 ROUND_BLENDS, ROUND_RUNS, PER_ROUND = range(3)
-_MARGIN = 1e-3  # of the exponent
+FAR = np.float32(2.0**24)  # pixels
+_MARGIN = 1e-3  # of the exponent and of the box
 _SLENDER = 2.0**14  # product of the variances over the determinant: beyond, rounding decides too much
 _ROUNDING = 2.0**-16
 
 
 @kernel(lent=True, error_model="numpy")
-def reach_box(entry: Any, box: Any) -> None:
-    """Find the pixels at which an entry may be seen: those outside have an alpha under 1/255, rounding included."""
-    a, b, c, opacity = np.float64(entry[A]), np.float64(entry[B]), np.float64(entry[C]), np.float64(entry[OPACITY])
-    x, y = np.float64(entry[GX]), np.float64(entry[GY])
+def visible_reach(conic: Any, reach: Any) -> None:
+    """Find how far a Gaussian may be seen: beyond, its alpha is under 1/255, rounding included.
+
+    Where nothing of the kind is certain (slivers, opacities that are none), it is seen everywhere.
+    """
+    a, b, c, opacity = np.float64(conic[0]), np.float64(conic[1]), np.float64(conic[2]), np.float64(conic[3])
     det = a * c - b * b
-    box[0], box[1], box[2], box[3] = -EVERYWHERE, EVERYWHERE, -EVERYWHERE, EVERYWHERE
+    reach[WIDE], reach[HIGH], reach[LEAST_POWER] = FAR, FAR, -np.inf
     if 0.0 <= opacity < 0.999 * np.float64(LEAST_ALPHA):
-        box[0], box[1], box[2], box[3] = NOWHERE, -NOWHERE, NOWHERE, -NOWHERE
-        return
-    if not (a > 0.0 and c > 0.0 and det * _SLENDER > a * c and opacity < 1e6 and abs(x) < 1e6 and abs(y) < 1e6):
-        return
-    slack = 1.0 + _ROUNDING * (a * c / det)
-    reach = (2.0 * np.log(opacity * 255.0) + _MARGIN) * slack + _MARGIN
-    if reach > 0.0:
-        wide, high = np.sqrt(reach * c / det) + _MARGIN, np.sqrt(reach * a / det) + _MARGIN
-        if wide < 1e6 and high < 1e6:
-            box[0], box[1] = np.int64(np.floor(x - wide)), np.int64(np.ceil(x + wide))
-            box[2], box[3] = np.int64(np.floor(y - high)), np.int64(np.ceil(y + high))
+        reach[WIDE], reach[HIGH], reach[LEAST_POWER] = -FAR, -FAR, np.inf
+    elif a > 0.0 and c > 0.0 and det * _SLENDER > a * c and opacity < 1e6:
+        power = np.log(opacity * 255.0) + _MARGIN
+        square = max(2.0 * power * (1.0 + _ROUNDING * (a * c / det)) + _MARGIN, 0.0)
+        reach[WIDE] = min(np.sqrt(square * c / det) * (1.0 + _MARGIN) + _MARGIN, FAR)
+        reach[HIGH] = min(np.sqrt(square * a / det) * (1.0 + _MARGIN) + _MARGIN, FAR)
+        reach[LEAST_POWER] = -power - _MARGIN
+
+
+@kernel(lent=True)
+def reach_box(x: Any, y: Any, reach: Any, box: Any) -> None:
+    """Give the columns and rows of pixels within reach of a place."""
+    x, y = min(max(x, -FAR), FAR), min(max(y, -FAR), FAR)  # NaN, too, becomes a number
+    box[0], box[1] = np.int32(np.floor(x - reach[WIDE])), np.int32(np.ceil(x + reach[WIDE]))
+    box[2], box[3] = np.int32(np.floor(y - reach[HIGH])), np.int32(np.ceil(y + reach[HIGH]))
 
 
 @kernel(lent=True)
@@ -64,7 +61,7 @@ def walk(
     Parameters
     ----------
     entries : ndarray, (>= count, ENTRY), float32
-    boxes : ndarray, (>= count, BOX), int64
+    boxes : ndarray, (>= count, BOX), int32
     count : int
         Entries.
     state, lasts : ndarray
@@ -87,13 +84,9 @@ def walk(
     living = 0
     for part in range(len(alive)):
         living += popcount(np.uint64(alive[part]))
-    blended_before = -2
-    k = 0
+    k, counted, before, unbounded_steps = 0, 0, -2, 0
     while k < count and living:
-        box = boxes[k]
-        totals[EVALUATIONS] += living
-        exp_lanes = living
-        if box[0] <= right and box[1] >= left and box[2] <= bottom and box[3] >= top:
+        if boxes[k, 0] <= right and boxes[k, 1] >= left and boxes[k, 2] <= bottom and boxes[k, 3] >= top:
             blended, stopped, unbounded = 0, 0, 0
             for part in range(len(alive)):
                 if alive[part]:
@@ -104,18 +97,22 @@ def walk(
                         alive[part] = np.uint32(alive[part] & ~stops)
                     if wild:
                         unbounded += popcount(np.uint64(wild))
-            living -= stopped
-            totals[STOPPED] += stopped
-            totals[SKIPPED_POWER] += unbounded
-            exp_lanes -= unbounded
+            if unbounded:
+                totals[SKIPPED_POWER] += unbounded
+                unbounded_steps += unbounded == living
+            if stopped:
+                totals[EVALUATIONS] += living * (k + 1 - counted)
+                counted = k + 1
+                living -= stopped
+                totals[STOPPED] += stopped
             if blended:
                 totals[BLENDED] += blended
                 totals[BLEND_STEPS] += 1
                 per_round[k // batch, ROUND_BLENDS] += 1
-                per_round[k // batch, ROUND_RUNS] += k != blended_before + 1
-                blended_before = k
+                per_round[k // batch, ROUND_RUNS] += k != before + 1
+                before = k
                 marks[k] |= bit
-        totals[EXP_LANES] += exp_lanes
-        totals[EXP_STEPS] += exp_lanes > 0
         k += 1
+    totals[EVALUATIONS] += living * (k - counted)
     totals[TRIPS] = k
+    totals[BOUNDED_STEPS] = k - unbounded_steps

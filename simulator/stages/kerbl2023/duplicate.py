@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -17,13 +18,14 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.kerbl2023.events import DuplicateEvent
 from tilestamp.simulator.stages.kerbl2023.project import Projected
-from tilestamp.simulator.stages.kerbl2023.sectors import record_sectors, rising_transactions
+from tilestamp.simulator.stages.kerbl2023.sectors import record_sectors
 from tilestamp.simulator.stages.kerbl2023.tile_rules import BOUNDS, SQUARE, cut_off, tile_columns, tile_rows
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 KEY_BYTES, VALUE_BYTES = 8, 4
+UNROLLED = 4  # tiles of the loop over columns
 _MOST = 2**31  # pairs: offsets are 32 bits wide
 _PART = 1 << 13  # Gaussians, at least
 _E = DuplicateEvent
@@ -45,8 +47,8 @@ class Pairs(NamedTuple):
 
 
 @kernel(lent=True)
-def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, values: Any) -> int:
-    """Write the pairs of one Gaussian; gives its rows."""
+def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, values: Any, widths: Any) -> int:
+    """Write the pairs of one Gaussian; gives its rows, and ``widths`` the tiles of each."""
     conic = out.conics[i]
     x, y, radius = out.positions[i, 0], out.positions[i, 1], out.radii[i]
     reach = cut_off(conic) if rule != SQUARE else (np.float32(0), np.float32(0), np.float32(0))
@@ -54,6 +56,7 @@ def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, 
     depth = np.uint64(out.depths.view(np.uint32)[i])
     for row in range(first_row, last_row + 1):
         first, last = tile_columns(rule, row, x, y, radius, reach, conic, tiles)
+        widths[row - first_row] = max(0, last - first + 1)
         for column in range(first, last + 1):
             keys[at] = (np.uint64(row * tiles.columns + column) << np.uint64(32)) | depth
             values[at] = i
@@ -63,44 +66,48 @@ def _write(i: int, at: int, out: Projected, rule: int, tiles: Tiles, keys: Any, 
 
 
 @kernel(lent=True)
-def _count_trips(first: int, lanes: int, trips: int, ends: Any, scratch: Any, rule: int, row: Any) -> None:
-    """Sectors of the loop over tiles: in each trip a depth is loaded, a key and an index stored."""
-    for trip in range(trips):
+def _count_row(first: int, lanes: int, r: int, tight: bool, begins: Any, widths: Any, segment: int, row: Any) -> None:
+    """Sectors of one row of tiles: a key and an index stored for each tile, and a depth loaded by the published rule.
+
+    The loop over columns is compiled in fours, behind one for what is left over: lanes of other widths take turns.
+    """
+    fours = rest = 0
+    for lane in range(lanes):
+        fours = max(fours, widths[lane, r] // UNROLLED)
+        rest = max(rest, widths[lane, r] % UNROLLED)
+    loads = stores = 0
+    for step in range(rest + UNROLLED * fours):
+        key, value, depth = -1, -1, -1
         for lane in range(lanes):
-            here = ends[first + lane - 1] + trip if first + lane else trip
-            scratch[0, lane] = here * KEY_BYTES if here < ends[first + lane] else -1
-            scratch[1, lane] = here * VALUE_BYTES if here < ends[first + lane] else -1
-            scratch[2, lane] = (first + lane) * 4 if here < ends[first + lane] else -1
-        for access in range(3):
-            n, size = rising_transactions(scratch[access], lanes, 4 if access else KEY_BYTES, rule)
-            if access == 2:
-                row[_E.LOAD_TRANSACTIONS] += n
-                row[_E.LOAD_BYTES] += size
-            else:
-                row[_E.STORE_TRANSACTIONS] += n
-                row[_E.STORE_BYTES] += size
+            width = widths[lane, r]
+            if step < width % UNROLLED if step < rest else (step - rest) // UNROLLED < width // UNROLLED:
+                at = begins[lane]
+                begins[lane] = at + 1
+                stores += (at * KEY_BYTES // segment != key) + (at * VALUE_BYTES // segment != value)
+                key, value = at * KEY_BYTES // segment, at * VALUE_BYTES // segment
+                loads += (first + lane) * 4 // segment != depth
+                depth = (first + lane) * 4 // segment
+    row[_E.STEPS] += rest + UNROLLED * fours
+    row[_E.STORE_TRANSACTIONS] += stores
+    if not tight:
+        row[_E.LOAD_TRANSACTIONS] += loads
 
 
 @kernel(lent=True)
 def _count_warp(
-    first: int, lanes: int, warp: int, ends: Any, rows: Any, radii: Any, tight: int, active: Any, scratch: Any,
-    rule: int, row: Any,
+    first: int, lanes: int, begins: Any, sizes: Any, rows: Any, widths: Any, radii: Any, tight: bool, active: Any,
+    segment: int, row: Any,
 ) -> None:  # fmt: skip
-    """Events of one warp."""
+    """Events of one warp: of each lane where its pairs begin, how many they are, its rows of tiles, their widths."""
     visible, trips, row_trips = 0, 0, 0
-    for lane in range(warp):
+    for lane in range(lanes):
         active[lane] = 1
-        if lane >= lanes:
-            active[lane] = 0
-    n, size = record_sectors(active, warp, first, 4, 1, 4, rule, scratch[0])
-    row[_E.LOAD_TRANSACTIONS] += n
-    row[_E.LOAD_BYTES] += size
+    row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 4, 1, 4, segment)
     for lane in range(lanes):
         active[lane] = radii[first + lane] > 0
         visible += active[lane]
-        before = ends[first + lane - 1] if first + lane else 0
-        trips = max(trips, ends[first + lane] - before)
-        row[_E.PAIRS] += ends[first + lane] - before
+        trips = max(trips, sizes[lane])
+        row[_E.PAIRS] += sizes[lane]
         row_trips = max(row_trips, rows[lane])
         row[_E.ROW_LANES] += rows[lane]
     row[_E.WARPS] += 1
@@ -111,39 +118,51 @@ def _count_warp(
     row[_E.TRIPS] += trips
     row[_E.LONGEST_TRIPS] = max(row[_E.LONGEST_TRIPS], trips)
     row[_E.LONGEST_ROW_TRIPS] = max(row[_E.LONGEST_ROW_TRIPS], row_trips)
-    if visible:
-        for k in range(3 if tight else 2):
-            size = 4 << k
-            n, total = record_sectors(active, warp, first, size, 1, size, rule, scratch[0])
-            row[_E.LOAD_TRANSACTIONS] += n
-            row[_E.LOAD_BYTES] += total
-    _count_trips(first, lanes, trips, ends, scratch, rule, row)
+    if first == 0:
+        active[0] = 0  # which adds up from nothing
+    row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first - 1, 4, 1, 4, segment)  # where the one before ends
+    if first == 0:
+        active[0] = radii[0] > 0
+    row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 8, 1, 8, segment)
+    if tight:  # conic and depth
+        row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 16, 1, 16, segment)
+        row[_E.LOAD_TRANSACTIONS] += record_sectors(active, lanes, first, 4, 1, 4, segment)
+    for r in range(row_trips):
+        for lane in range(lanes):
+            widths[lane, r] = widths[lane, r] if r < rows[lane] else 0
+        _count_row(first, lanes, r, tight, begins, widths, segment, row)
 
 
 @kernel
 def _duplicate(
-    part: int, parts: int, out: Projected, ends: Any, bound: int, tiles: Tiles, warp: int, rule: int, keys: Any,
+    part: int, parts: int, out: Projected, ends: Any, bound: int, tiles: Tiles, warp: int, segment: int, keys: Any,
     values: Any, table: Any,
 ) -> None:  # fmt: skip
     """Write the pairs of a part of the blocks."""
     count = len(ends)
     blocks = (count + BLOCK - 1) // BLOCK
     rows, active = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
-    scratch = np.zeros((3, warp), np.int64)
+    begins, sizes = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
+    widths = np.zeros((warp, tiles.rows), np.int64)
     for block in range(blocks * part // parts, blocks * (part + 1) // parts):
         end = min((block + 1) * BLOCK, count)
         for first in range(block * BLOCK, end, warp):
             lanes = min(warp, end - first)
             for lane in range(lanes):
                 i = first + lane
+                begins[lane] = ends[i - 1] if i else 0
+                sizes[lane] = ends[i] - begins[lane]
                 rows[lane] = 0
                 if out.radii[i] > 0:
-                    rows[lane] = _write(i, ends[i - 1] if i else 0, out, bound, tiles, keys, values)
+                    rows[lane] = _write(i, begins[lane], out, bound, tiles, keys, values, widths[lane])
             if table is not None:
-                tight = int(bound != SQUARE)
-                _count_warp(first, lanes, warp, ends, rows, out.radii, tight, active, scratch, rule, table[block])
+                tight = bound != SQUARE
+                _count_warp(first, lanes, begins, sizes, rows, widths, out.radii, tight, active, segment, table[block])
         if table is not None:
-            table[block, _E.BLOCKS] = 1
+            row = table[block]
+            row[_E.BLOCKS] = 1
+            row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * segment
+            row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * segment
 
 
 def duplicate(
@@ -185,7 +204,7 @@ def duplicate(
     keys, values = np.empty(pairs, np.uint64), np.empty(pairs, np.uint32)
     blocks = -(-len(ends) // BLOCK)
     table = np.zeros((blocks, len(_E)), np.int64) if counting else None
-    shape = (simt.warp, int(simt.coalescing))
+    shape = (simt.warp, smallest_transaction_bytes(int(simt.coalescing)))
     parts = parts_of(blocks, _PART // BLOCK)
     for_parts(_duplicate, parts, projected, ends, BOUNDS[bound], tiles, *shape, keys, values, table)
     return StageResult(Pairs(keys, values), () if table is None else (duplicate_work(table, bound),))

@@ -40,7 +40,7 @@ class TightCountEvent(IntEnum):
     """Events of a block of 256 threads that counts the tiles of its Gaussians by box or ellipse."""
 
     WARPS = 0
-    GAUSSIANS = 1
+    LANES = 1
     VISIBLE_WARPS = 2  # with a lane of radius > 0
     VISIBLE_LANES = 3
     OPAQUE_WARPS = 4  # with a lane whose opacity reaches 1/255: extents
@@ -79,6 +79,7 @@ class DuplicateEvent(IntEnum):
     STORE_BYTES = 12
     BLOCKS = 13
     LONGEST_ROW_TRIPS = 14  # of the warp with most
+    STEPS = 15  # pairs stored by a warp, an instruction each: lanes whose rows differ in width take turns
 
 
 class SortEvent(IntEnum):

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -36,12 +37,12 @@ BLOCK = 256  # threads
 # is a store, bytes of a record, instructions, and the bytes of each. A matrix is the same for all lanes.
 ACCESSES = (
     (0, 0, 12, 3, 4), (0, 1, 4, 1, 4), (0, 1, 4, 1, 4), (0, 0, 0, 4, 4),
-    (1, 0, 0, 28, 4), (1, 0, 12, 3, 4), (1, 0, 16, 4, 4), (1, 1, 24, 6, 4),
+    (1, 0, 0, 24, 4), (1, 0, 12, 3, 4), (1, 0, 12, 3, 4), (1, 0, 16, 4, 4), (1, 1, 24, 6, 4), (1, 0, 24, 5, 4),
     (3, 1, 4, 1, 4), (3, 1, 4, 1, 4), (3, 1, 4, 1, 4), (3, 1, 8, 1, 8), (3, 0, 4, 1, 4), (3, 1, 16, 1, 16),
 )  # fmt: skip
 BUFFERS = (
     "means", "radii", "tiles", "matrices",
-    "matrices", "scales", "rotations", "cov3d",
+    "matrices", "means", "scales", "rotations", "cov3d", "cov3d",
     "radii", "tiles", "depths", "positions", "opacities", "conics",
 )  # fmt: skip
 _PART = 1 << 14  # Gaussians, at least
@@ -117,7 +118,7 @@ def _gaussian(
 
 
 @kernel(lent=True)
-def _count_warp(first: int, lanes: int, reached: Any, active: Any, scratch: Any, rule: int, row: Any) -> None:
+def _count_warp(first: int, lanes: int, reached: Any, active: Any, segment: int, row: Any) -> None:
     """Events of one warp, whose lanes got as far as ``reached`` says."""
     row[_E.WARPS] += 1
     row[_E.GAUSSIANS] += lanes
@@ -140,24 +141,22 @@ def _count_warp(first: int, lanes: int, reached: Any, active: Any, scratch: Any,
             active[lane] = lane < lanes and reached[lane] >= level
         for record in ACCESSES:
             if record[0] == level:
-                n, size = record_sectors(active, len(active), first, record[2], record[3], record[4], rule, scratch)
+                n = record_sectors(active, len(active), first, record[2], record[3], record[4], segment)
                 if record[1]:
                     row[_E.STORE_TRANSACTIONS] += n
-                    row[_E.STORE_BYTES] += size
                 else:
                     row[_E.LOAD_TRANSACTIONS] += n
-                    row[_E.LOAD_BYTES] += size
 
 
 @kernel
 def _project(
     part: int, parts: int, means: Any, scales: Any, rotations: Any, opacities: Any, lens: Lens, tiles: Tiles,
-    warp: int, rule: int, out: Any, space: Any, table: Any,
+    warp: int, segment: int, out: Any, space: Any, table: Any,
 ) -> None:  # fmt: skip
     """Project a part of the blocks."""
     count = len(means)
     blocks = (count + BLOCK - 1) // BLOCK
-    reached, active, scratch = np.zeros(warp, np.int64), np.zeros(warp, np.int64), np.zeros(warp, np.int64)
+    reached, active = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
     for block in range(blocks * part // parts, blocks * (part + 1) // parts):
         end = min((block + 1) * BLOCK, count)
         for first in range(block * BLOCK, end, warp):
@@ -165,9 +164,11 @@ def _project(
             for lane in range(lanes):
                 reached[lane] = _gaussian(first + lane, means, scales, rotations, opacities, lens, tiles, out, space)
             if table is not None:
-                _count_warp(first, lanes, reached, active, scratch, rule, table[block])
+                _count_warp(first, lanes, reached, active, segment, table[block])
         if table is not None:
             table[block, _E.BLOCKS] = 1
+            table[block, _E.LOAD_BYTES] = table[block, _E.LOAD_TRANSACTIONS] * segment
+            table[block, _E.STORE_BYTES] = table[block, _E.STORE_TRANSACTIONS] * segment
 
 
 def project(
@@ -205,7 +206,7 @@ def project(
     table = np.zeros((blocks, len(_E)), np.int64) if counting else None
     inputs = (splats.means, splats.scales, splats.rotations, splats.opacities)
     lens = lens_of(camera, tiles.width, tiles.height)
-    shape = (simt.warp, int(simt.coalescing))
+    shape = (simt.warp, smallest_transaction_bytes(int(simt.coalescing)))
     for_parts(_project, parts_of(blocks, _PART // BLOCK), *inputs, lens, tiles, *shape, out, space, table)
     return StageResult(out, () if table is None else (project_work(table),))
 

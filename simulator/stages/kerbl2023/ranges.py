@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import SECTOR_BYTES
+from tilestamp.models.coalescing import SECTOR_BYTES, smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -16,14 +16,15 @@ from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
 DEPTH_BITS = 32
+PAIR_BYTES = 8  # of a range: start and end
 _E = RangesEvent
 
 
 @kernel
-def _ranges(keys: Any, starts: Any, warp: int, table: Any) -> None:
+def _ranges(keys: Any, starts: Any, warp: int, segment: int, table: Any) -> None:
     """Fill ``starts``; a thread whose pair is of another tile than the one before stores both ends."""
-    tile = last_warp = 0
-    before = np.int64(-1)
+    tile = np.int64(0)
+    before, last_warp, end_sector, start_sector = np.int64(-1), -1, np.int64(-1), np.int64(-1)
     for i in range(len(keys)):
         here = np.int64(keys[i] >> np.uint64(DEPTH_BITS))
         while tile <= here:
@@ -32,11 +33,18 @@ def _ranges(keys: Any, starts: Any, warp: int, table: Any) -> None:
         if table is not None and here != before:
             row = table[i // BLOCK]
             row[_E.LISTED_TILES] += 1
-            row[_E.EDGE_WARPS] += i // warp + 1 != last_warp
-            last_warp = i // warp + 1
-            row[_E.STORE_TRANSACTIONS] += 2 if i else 1
+            if i // warp != last_warp:
+                last_warp, end_sector, start_sector = i // warp, np.int64(-1), np.int64(-1)
+                row[_E.EDGE_WARPS] += 1
+            if i:  # the end of the list before
+                row[_E.STORE_TRANSACTIONS] += (before * PAIR_BYTES + 4) // segment != end_sector
+                end_sector = (before * PAIR_BYTES + 4) // segment
+            row[_E.STORE_TRANSACTIONS] += here * PAIR_BYTES // segment != start_sector
+            start_sector = here * PAIR_BYTES // segment
         before = here
     starts[tile:] = len(keys)
+    if table is not None:
+        table[-1, _E.STORE_TRANSACTIONS] += 1  # the end of the last list
 
 
 def ranges(
@@ -61,7 +69,8 @@ def ranges(
     starts = np.zeros(tiles + 1, np.int64)
     blocks = -(-len(keys) // BLOCK)
     table = np.zeros((blocks, len(_E)), np.int64) if counting and blocks else None
-    _ranges(keys, starts, simt.warp, table)
+    segment = smallest_transaction_bytes(int(simt.coalescing))
+    _ranges(keys, starts, simt.warp, segment, table)
     return StageResult(starts, () if table is None else (_work(table, len(keys), tiles, simt),))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import contiguous
+from tilestamp.models.coalescing import contiguous, smallest_transaction_bytes
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
@@ -13,6 +13,7 @@ from tilestamp.simulator.work import Work
 BLOCK = 128  # threads
 ITEMS = 24  # a thread, which a block reads and writes one behind another
 SHARED_BYTES = 12304
+LOOK_BACK_LOADS, LOOK_BACK_STORES = 18, 2  # transactions of a block, as on an H200 in the mean: sums of those before it
 _E = ThreadEvent
 
 
@@ -48,6 +49,9 @@ def scan_works(count: int, simt: Simt) -> tuple[Work, Work]:
         rows = slice(None) if k == 0 else slice(k, None)
         table[rows, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = moved
         table[rows, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES]] = moved
+    segment = smallest_transaction_bytes(int(simt.coalescing))
+    table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] += np.multiply(LOOK_BACK_LOADS, (1, segment))
+    table[:, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES]] += np.multiply(LOOK_BACK_STORES, (1, segment))
     total = 4 * count
     summed = Work(
         stage="scan",

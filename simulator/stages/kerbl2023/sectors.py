@@ -1,41 +1,16 @@
-"""Transactions of a warp whose active lanes touch rising addresses, as records by the lane's number do."""
+"""Transactions of a warp whose lanes touch rising addresses, as records by the lane's number do.
+
+A transaction is the machine's smallest: a sector of 32 bytes, a line of 128 where loads go through lines.
+"""
 
 from typing import Any
 
-from tilestamp.models.coalescing import HALF_WARP, HALF_WARP_SEGMENTS, SECTOR_BYTES, SEGMENT_BYTES, transactions
-from tilestamp.models.coalescing import WARP_LINES as LINES
 from tilestamp.models.kernel import kernel
 
-WORD_BYTES = 4
-
 
 @kernel(lent=True)
-def rising_transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
-    """``transactions`` of lanes whose addresses never fall, inactive ones (negative) left out."""
-    if rule == HALF_WARP_SEGMENTS:
-        found: tuple[int, int] = transactions(addresses, lanes, access_bytes, rule)
-        return found
-    segment, request = SECTOR_BYTES, lanes
-    if rule == LINES:
-        segment = SEGMENT_BYTES
-        if access_bytes > WORD_BYTES:
-            request = max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
-    count, last = 0, -1
-    for lane in range(lanes):
-        if lane % request == 0:
-            last = -1
-        if addresses[lane] >= 0:
-            here = addresses[lane] // segment
-            count += here != last
-            last = here
-    return count, count * segment
-
-
-@kernel(lent=True)
-def record_sectors(
-    active: Any, lanes: int, first: int, stride: int, words: int, word_bytes: int, rule: int, scratch: Any
-) -> tuple[int, int]:
-    """Transactions, and their bytes, of active lanes that each touch the words of a record of their own.
+def record_sectors(active: Any, lanes: int, first: int, stride: int, words: int, word_bytes: int, segment: int) -> int:
+    """Transactions of active lanes that each touch the words of a record of their own.
 
     Parameters
     ----------
@@ -45,18 +20,18 @@ def record_sectors(
     first : int
         Record of lane 0.
     stride : int
-        Bytes of a record.
+        Bytes of a record; 0 where all touch the same.
     words, word_bytes : int
         Instructions, and what each touches.
-    rule : int
-        A ``Coalescing``.
-    scratch : ndarray, (>= lanes,), int64
+    segment : int
+        Bytes of a transaction.
     """
-    count = total = 0
+    count = 0
     for word in range(words):
+        last = -1
         for lane in range(lanes):
-            scratch[lane] = (first + lane) * stride + word * word_bytes if active[lane] else -1
-        n, size = rising_transactions(scratch, lanes, word_bytes, rule)
-        count += n
-        total += size
-    return count, total
+            if active[lane]:
+                here = ((first + lane) * stride + word * word_bytes) // segment
+                count += here != last
+                last = here
+    return count

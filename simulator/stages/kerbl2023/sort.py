@@ -30,6 +30,9 @@ HISTOGRAM_BLOCK, HISTOGRAM_SHARED_BYTES, HISTOGRAM_BLOCKS_PER_SM = 128, 8192, 9
 TILE = BLOCK * ITEMS  # pairs a block
 HISTOGRAM_TILE = 16 * HISTOGRAM_BLOCK  # keys that a block of the histogram reads at a time
 COUNTS_A_SECTOR = SECTOR_BYTES // 4
+BIN_SECTORS = RADIX * 4 // SECTOR_BYTES  # of a count of each digit
+BINS_STORED = 2  # by a block: its own counts, then those of all blocks up to it
+BINS_READ = 14  # by a block: where digits begin, and counts of blocks before it; as an H200 does in the mean
 _E = SortEvent
 
 
@@ -83,25 +86,38 @@ def _scatter(
             new_values[at] = values[i]
 
 
+@kernel(lent=True)
+def _run_sectors(place: int, start: int, count: int, warp: int) -> int:
+    """Sectors of a run that begins at a place of the sorted block: each instruction stores a warp's pairs of it."""
+    sectors = 0
+    while count:
+        part = min(count, warp - place % warp)
+        for width in (KEY_BYTES, VALUE_BYTES):
+            sectors += ((start + part) * width - 1) // SECTOR_BYTES - start * width // SECTOR_BYTES + 1
+        place, start, count = place + part, start + part, count - part
+    return sectors
+
+
 @kernel
 def _count_runs(counts: Any, starts: Any, pairs: int, warp: int, table: Any) -> None:
-    """Events of the blocks of a pass: loads of whole blocks, stores of runs."""
+    """Events of the blocks of a pass: loads of whole blocks, stores of runs, and the digit counts of blocks before."""
     for block in range(len(counts)):
         row = table[block]
         size = min(TILE, pairs - block * TILE)
         row[_E.WARPS] = (BLOCK + warp - 1) // warp
         row[_E.PAIRS] = size
         row[_E.BLOCKS] = row[_E.PASSES] = 1
+        row[_E.LOAD_TRANSACTIONS] = BINS_READ * BIN_SECTORS
+        row[_E.STORE_TRANSACTIONS] = BINS_STORED * BIN_SECTORS
         for width in (KEY_BYTES, VALUE_BYTES):
             row[_E.LOAD_TRANSACTIONS] += (size * width + SECTOR_BYTES - 1) // SECTOR_BYTES
+        place = 0
         for digit in range(RADIX):
             count = counts[block, digit]
             if count:
                 row[_E.DIGITS] += 1
-                for width in (KEY_BYTES, VALUE_BYTES):
-                    first = starts[block, digit] * width // SECTOR_BYTES
-                    last = ((starts[block, digit] + count) * width - 1) // SECTOR_BYTES
-                    row[_E.STORE_TRANSACTIONS] += last - first + 1
+                row[_E.STORE_TRANSACTIONS] += _run_sectors(place, starts[block, digit], count, warp)
+                place += count
         row[_E.ALIKE], row[_E.MIXED] = row[_E.DIGITS] == 1, row[_E.DIGITS] > 1
         row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * SECTOR_BYTES
         row[_E.STORE_BYTES] = row[_E.STORE_TRANSACTIONS] * SECTOR_BYTES

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -39,11 +40,11 @@ def _count(i: int, out: Projected, bound: int, tiles: Tiles, counts: Any) -> Any
 
 @kernel
 def _tight_count(
-    part: int, parts: int, out: Projected, bound: int, tiles: Tiles, warp: int, rule: int, counts: Any, table: Any
+    part: int, parts: int, out: Projected, bound: int, tiles: Tiles, warp: int, segment: int, counts: Any, table: Any
 ) -> None:
     """Count the tiles of a part of the blocks."""
     count = len(counts)
-    active, scratch = np.zeros(warp, np.int64), np.zeros(warp, np.int64)
+    active = np.zeros(warp, np.int64)
     blocks = (count + BLOCK - 1) // BLOCK
     for i in range(blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, count), warp):
         lanes = min(warp, count - i)
@@ -61,7 +62,7 @@ def _tight_count(
         if table is not None:
             row = table[i // BLOCK]
             row[_E.WARPS] += 1
-            row[_E.GAUSSIANS] += lanes
+            row[_E.LANES] += lanes
             row[_E.VISIBLE_WARPS] += visible > 0
             row[_E.VISIBLE_LANES] += visible
             row[_E.OPAQUE_WARPS] += opaque > 0
@@ -71,26 +72,23 @@ def _tight_count(
             row[_E.LONGEST_ROW_TRIPS] = max(row[_E.LONGEST_ROW_TRIPS], longest)
             row[_E.PAIRS] += pairs
             row[_E.BLOCKS] = 1
-            _count_sectors(i, lanes, warp, visible, active, scratch, rule, row)
+            _count_sectors(i, lanes, warp, visible, active, segment, row)
 
 
 @kernel(lent=True)
-def _count_sectors(
-    first: int, lanes: int, warp: int, visible: int, active: Any, scratch: Any, rule: int, row: Any
-) -> None:
+def _count_sectors(first: int, lanes: int, warp: int, visible: int, active: Any, segment: int, row: Any) -> None:
     """Radii of all, positions and conics of the visible; a count is stored for all."""
+    loads = 0
     if visible:
         for size in (8, 16):
-            n, total = record_sectors(active, warp, first, size, 1, size, rule, scratch)
-            row[_E.LOAD_TRANSACTIONS] += n
-            row[_E.LOAD_BYTES] += total
+            loads += record_sectors(active, warp, first, size, 1, size, segment)
     for lane in range(warp):
         active[lane] = lane < lanes
-    n, total = record_sectors(active, warp, first, 4, 1, 4, rule, scratch)
-    row[_E.LOAD_TRANSACTIONS] += n
-    row[_E.LOAD_BYTES] += total
-    row[_E.STORE_TRANSACTIONS] += n
-    row[_E.STORE_BYTES] += total
+    all_lanes = record_sectors(active, warp, first, 4, 1, 4, segment)
+    row[_E.LOAD_TRANSACTIONS] += loads + all_lanes
+    row[_E.LOAD_BYTES] += (loads + all_lanes) * segment
+    row[_E.STORE_TRANSACTIONS] += all_lanes
+    row[_E.STORE_BYTES] += all_lanes * segment
 
 
 def tight_count(
@@ -114,7 +112,7 @@ def tight_count(
     counts = np.zeros(len(projected.radii), np.uint32)
     blocks = -(-len(counts) // BLOCK)
     table = np.zeros((blocks, len(_E)), np.int64) if counting else None
-    shape = (simt.warp, int(simt.coalescing))
+    shape = (simt.warp, smallest_transaction_bytes(int(simt.coalescing)))
     parts = parts_of(blocks, _PART // BLOCK)
     for_parts(_tight_count, parts, projected, BOUNDS[bound], tiles, *shape, counts, table)
     found = projected._replace(tiles=counts)
@@ -123,7 +121,7 @@ def tight_count(
 
 def tight_count_work(table: NDArray[np.int64], bound: str) -> Work:
     """Work of the kernel, from the rows of its blocks."""
-    lanes, visible = (int(table[:, event].sum()) for event in (_E.GAUSSIANS, _E.VISIBLE_LANES))
+    lanes, visible = (int(table[:, event].sum()) for event in (_E.LANES, _E.VISIBLE_LANES))
     return Work(
         stage="project",
         kernel="tight_count",
