@@ -2,7 +2,7 @@
 
 import pytest
 
-from tilestamp.experiments.stability import splats
+from tilestamp.experiments.stability import splat_shapes, splats
 
 
 @pytest.mark.parametrize(("opacity", "wrong"), [(0.35, False), (0.42, True)])
@@ -39,3 +39,13 @@ def test_a_sliver_without_width_is_lost_where_a_pixel_is_too_small_to_count(powe
 @pytest.mark.parametrize(("scale", "waits"), [(0.05, False), (2.0, True)])
 def test_one_thread_writes_all_tiles_of_a_large_gaussian(scale, waits):
     assert (splats.waits(scale) > 0.5) == waits
+
+
+def test_a_small_gaussian_is_where_it_is_seen_and_a_large_one_is_not():
+    assert splat_shapes.width_error(0.02) < 0.05
+    assert splat_shapes.width_error(0.2) > 5
+
+
+def test_the_determinant_of_a_long_needle_cancels():
+    assert splat_shapes.determinant_error(300.0) < 0.02
+    assert splat_shapes.determinant_error(10000.0) > 0.1
