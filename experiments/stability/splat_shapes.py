@@ -25,7 +25,7 @@ DIAGONAL = (np.cos(np.pi / 8), 0.0, 0.0, np.sin(np.pi / 8))
 
 def conic(mean: ArrayLike, scale: ArrayLike, rotation: ArrayLike = UPRIGHT) -> tuple[float, float, float]:
     """Inverse covariance of a single Gaussian on the screen: xx, xy, yy."""
-    frame = drawn([mean], scale, 0.9, rotation=rotation, fidelity="counts").frame
+    frame = drawn(np.atleast_2d(np.asarray(mean)), scale, 0.9, rotation=rotation, fidelity="counts").frame
     xx, xy, yy, _ = frame.buffers["conics"][0].tolist()
     return xx, xy, yy
 
