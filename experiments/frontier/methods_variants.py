@@ -76,6 +76,8 @@ ROADS = [  # not taken by the papers (experiments/exploration)
     Variant("micropolygon", "shared vertices", {"shading": "shared"}),
     Variant("micropolygon", "shading what is visible", {"shading": "visible"}),
     Variant("micropolygon", "masks, tile 4 in 16", {"coarse": 16, "tile": 4}),
+    Variant("micropolygon", "16-bit edges, halves", {"edges": "half"}),
+    Variant("micropolygon", "16-bit edges, snapped", {"edges": "snapped"}),
     Variant("micropolygon", "grids sorted and culled", {"cull": "sorted"}),
     Variant("micropolygon", "buckets, tile 8 in 32", {"coarse": 32, "second_level": "buckets"}),
 ]

@@ -49,6 +49,7 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.culled_raster import Cull, culled_raster, dice_nearest
 from tilestamp.simulator.stages.eisenacher2010.dice import GRID_SIDE, Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.edge_equations import snap_vertices
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
 from tilestamp.simulator.stages.eisenacher2010.link_grids import link_grids
 from tilestamp.simulator.stages.eisenacher2010.macro_raster import macro_raster
@@ -58,7 +59,7 @@ from tilestamp.simulator.stages.eisenacher2010.shared_vertices import dice_share
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import snap_edges
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, TileSize, screen_tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster import Edges, raster_work, tile_raster
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent, block_shape
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import SHORT, TileRasterEvent, block_shape
 from tilestamp.simulator.work import Work
 
 LARGEST_CULLED = 16  # pixels a side of a tile whose grids are culled
@@ -90,7 +91,8 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     box_tests: bool = True
     """Test boxes before edge functions."""
     edges: Edges = "computed"
-    """Edge equations computed by each thread, or computed while dicing and loaded."""
+    """Edge equations computed by each thread, or computed while dicing and loaded; in 16 bits as halves, as whole
+    numbers, or of snapped vertices (which the paper has not)."""
     near: Annotated[float, Meta(ge=0)] = 0.0
     """Sub-patches wholly nearer to the eye's plane are culled, so that splitting across it ends (not in the paper)."""
     min_depth: Annotated[int, Meta(ge=0, le=MAX_DEPTH)] = 0
@@ -118,15 +120,19 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         """Refuse what larger grids and late shading do not go with."""
         super().__post_init__()
-        if self.grid > GRID_SIDE and (self.hybrid or self.snap_edges or self.edges == "loaded"):
+        if self.grid > GRID_SIDE and (self.hybrid or self.snap_edges or self.edges != "computed"):
             raise TilestampError("grid: hybrid, snap_edges and loaded edges take grids of 4x4 vertices only")
         if self.shading != "vertices" and (self.hybrid or self.snap_edges):
             raise TilestampError("shading: hybrid and snap_edges shade the vertices of each grid by itself")
         if self.shading == "visible" and (self.spp > 1 or not self.box_tests):
             raise TilestampError("shading what is visible is written for one sample a pixel, with box tests")
+        if self.edges in SHORT and (
+            self.tile > FINE or self.spp > 1 or not self.box_tests or self.shading == "visible"
+        ):
+            raise TilestampError("edges of 16 bits: tiles of 4 or 8, one sample a pixel, box tests, shaded before")
         if self.coarse and (self.coarse <= self.tile or self.hybrid):
             raise TilestampError("coarse tiles are larger than tiles, and not for the hybrid")
-        if self.has_masks and (self.tile > FINE or self.spp > 1 or not self.box_tests or self.edges == "loaded"):
+        if self.has_masks and (self.tile > FINE or self.spp > 1 or not self.box_tests or self.edges != "computed"):
             raise TilestampError(
                 "coarse tiles with masks: tiles of 4 or 8, one sample a pixel, box tests, edges computed"
             )
@@ -149,9 +155,9 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
 
     def launches(self, simt: Simt) -> list[Work]:
         """Tile raster has a thread a pixel of a tile, and its samples in shared memory."""
-        loaded = self.edges == "loaded"
+        loaded, short = self.edges != "computed", self.edges in SHORT
         size = self.coarse if self.coarse and self.has_masks else self.tile
-        shape = block_shape(size, self.spp, simt, box_tests=self.box_tests, loaded=loaded, grid=self.grid)
+        shape = block_shape(size, self.spp, simt, box_tests=self.box_tests, loaded=loaded, grid=self.grid, short=short)
         return [] if self.hybrid else [raster_work(shape, np.zeros((0, len(TileRasterEvent)), np.int64))]
 
 
@@ -199,6 +205,8 @@ def micropolygon(
         min_depth=options.min_depth,
     ).outputs  # fmt: skip
     grids, shaded = _dice(points, subpatches, view, options, execute)
+    if options.edges == "snapped":
+        grids = snap_vertices(grids, options.bound)
     if options.snap_edges:
         grids = execute(snap_edges, points, subpatches, grids, simt, textured=texture is not None).outputs.grids
     if options.hybrid:

@@ -13,6 +13,7 @@ ROADS = [
     {"shading": "visible"},
     {"coarse": 16, "tile": 4},
     {"cull": "sorted"},
+    {"edges": "fixed"},
     {"coarse": 32, "tile": 8, "second_level": "buckets"},
 ]
 

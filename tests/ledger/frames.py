@@ -46,6 +46,8 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         *(("h200", {"cull": "sorted", "tile": tile}) for tile in (4, 8, 16)),
         *((machine, {"cull": "sorted", "bound": 2.0}) for machine in ("gtx280", "h200")),
         ("h200", {"cull": "behind"}),
+        *(("h200", {"edges": edges, "tile": tile}) for edges, tile in (("half", 4), ("fixed", 8))),
+        ("gtx280", {"edges": "snapped"}),
         ("h200", {"grid": 7, "shading": "shared", "texture": TEXTURE}),
     ),
     "cudaraster": (

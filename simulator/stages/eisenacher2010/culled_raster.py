@@ -147,7 +147,7 @@ def _raster_tiles(
                 if by_depth and k >= (number - 1) // SORTED_TOGETHER * SORTED_TOGETHER:
                     break  # all others of the last piece are farther
                 continue
-            raster_grid(vertices, colors, members[k], (np.float64(x), np.float64(y)), shape, samples, row)
+            raster_grid(vertices, colors, None, members[k], (np.float64(x), np.float64(y)), shape, samples, row)
             drawn[taken] = kept[first + taken] = members[k]
             taken += 1
             if taken % batch == 0:

@@ -74,7 +74,7 @@ def _draw_fine(
         if column < x0 or column > x1 or line < y0 or line > y1:
             continue
         before = row[_E.SUBTILE_PASS]
-        raster_grid(vertices, colors, lists[first + k], origin, shape, samples, row)
+        raster_grid(vertices, colors, None, lists[first + k], origin, shape, samples, row)
         walked[k // batch] += 1
         passes[k // batch] += row[_E.SUBTILE_PASS] - before
 

@@ -66,7 +66,7 @@ def _blend(
             if ids[y, x] != BACKGROUND:
                 grid, v = first // vertices_a_grid, first % vertices_a_grid
                 place = (np.float64(x), np.float64(y))
-                sample_quad(vertices, colors, grid, v, (0, 0, 0, 0), place, shape, sample, None)
+                sample_quad(vertices, colors, None, grid, v, (0, 0, 0, 0), place, shape, sample, None)
             for channel in range(3):
                 image[y, x, channel] = (sample.color[0, 0] >> np.uint32(8 * channel)) & np.uint32(255)
 

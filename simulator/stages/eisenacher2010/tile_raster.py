@@ -20,6 +20,7 @@ from tilestamp.models.launch import LINE_BYTES, SECTOR_BYTES, Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.eisenacher2010.edge_equations import stored_edges
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     ALIGNMENTS,
@@ -47,7 +48,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
 )
 from tilestamp.simulator.work import Work
 
-Edges = Literal["computed", "loaded"]
+Edges = Literal["computed", "loaded", "half", "fixed", "snapped"]
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
 SMALLEST_WARP = 16  # lanes: 16 load a grid together
 
@@ -55,7 +56,9 @@ _E = TileRasterEvent
 
 
 @kernel(lent=True)
-def raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any) -> None:
+def raster_grid(
+    vertices: Any, colors: Any, stored: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any
+) -> None:
     """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
     tile, side, size = shape.tile, shape.side, shape.subtile
     left, top = origin
@@ -81,7 +84,7 @@ def raster_grid(vertices: Any, colors: Any, grid: int, origin: Any, shape: Block
                     row[_E.BOX_WARPS] += box_warps(span, shape)
                     row[_E.BOX_LANES] += columns * rows
             if inside:
-                counts = sample_quad(vertices, colors, grid, v, span, origin, shape, samples, row)
+                counts = sample_quad(vertices, colors, stored, grid, v, span, origin, shape, samples, row)
                 if row is not None:
                     row[_E.HIT_WARPS] += counts[0]
                     row[_E.HIT_LANES] += counts[1]
@@ -95,6 +98,7 @@ def _raster_tiles(
     parts: int,
     vertices: Any,
     colors: Any,
+    stored: Any,
     count: Any,
     start: Any,
     lists: Any,
@@ -123,7 +127,7 @@ def _raster_tiles(
         samples.color[:] = BACKGROUND
         samples.hits[:] = 0
         for k in range(first, first + grids):
-            raster_grid(vertices, colors, lists[k], origin, shape, samples, row)
+            raster_grid(vertices, colors, stored, lists[k], origin, shape, samples, row)
         resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
         if ids is not None:
             y, x = tile_row * shape.tile, column * shape.tile
@@ -145,7 +149,7 @@ def shared_bytes(shape: BlockShape) -> int:
     """Shared memory a block: a batch of grids, their edge equations if loaded, all samples where they are resolved."""
     grids: int = grids_together(shape)
     samples = shape.tile**2 * shape.side**2 * WORD_BYTES if shape.side > 1 else WORD_BYTES
-    return grids * (shape.grid**2 + shape.loaded * EDGE_VECTORS) * VECTOR_BYTES + samples
+    return grids * (shape.grid**2 + shape.loaded) * VECTOR_BYTES + samples
 
 
 def raster_streams(
@@ -166,7 +170,7 @@ def raster_streams(
     seen[lists] = True
     drawn = int(np.count_nonzero(seen))
     vertex_bytes = int(block_traffic(shape, simt).grid[lists % ALIGNMENTS, 1].sum())
-    edge_bytes = len(lists) * EDGE_VECTORS * VECTOR_BYTES if shape.loaded else 0
+    edge_bytes = len(lists) * shape.loaded * VECTOR_BYTES
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes - others
     stored, row = int(total[_E.STORE_BYTES]), max(SECTOR_BYTES, shape.tile * WORD_BYTES)
     streams = [
@@ -175,7 +179,7 @@ def raster_streams(
         Stream("framebuffer", "store", stored, stored, partial_lines=0 if row >= LINE_BYTES else stored // row),
     ]
     if shape.loaded:
-        streams.append(Stream("edges", "load", edge_bytes, drawn * EDGE_VECTORS * VECTOR_BYTES))
+        streams.append(Stream("edges", "load", edge_bytes, drawn * shape.loaded * VECTOR_BYTES))
     return tuple(streams)
 
 
@@ -185,7 +189,7 @@ def raster_work(
     """Work of the kernel, a row a tile; ``ids`` where it leaves numbers of quads in place of colours."""
     return Work(
         stage="tile_raster",
-        kernel="tile_raster" + "_ids" * ids,
+        kernel="tile_raster" + "_ids" * ids + "_stored" * (0 < shape.loaded < EDGE_VECTORS),
         events=_E,
         table=table,
         grid=len(table),
@@ -231,8 +235,9 @@ def tile_raster(
         Samples a pixel: 1, 4 or 16.
     box_tests : bool
         Test a quad's box against sub-tiles and samples before the edge functions.
-    edges : {"computed", "loaded"}
-        Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture.
+    edges : {"computed", "loaded", "half", "fixed", "snapped"}
+        Edge equations computed by each thread, or computed while dicing and loaded: other costs, the same picture. Or
+        in 16 bits (``edge_equations``; of vertices that have been snapped): another picture.
     ids : bool
         Leave the number of the quad that is seen in place of its colour (not in the paper); one sample a pixel.
     counting : bool
@@ -257,10 +262,11 @@ def tile_raster(
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
     colors = None if ids else vertices.view(np.uint32)[:, :, 3]
+    stored = stored_edges(vertices, edges) if edges in {"half", "fixed"} else None
     seen = np.full((height, width), BACKGROUND, np.uint32) if ids else None
     buffers = (image, depth, overdraw, seen, table)
     parts = parts_of(tiles.total, _PART_TILES)
-    for_parts(_raster_tiles, parts, vertices, colors, count, start, lists, tiles, shape, traffic, *buffers)
+    for_parts(_raster_tiles, parts, vertices, colors, stored, count, start, lists, tiles, shape, traffic, *buffers)
     pixels = Pixels(image if seen is None else seen, depth, overdraw)
     if table is None:
         return StageResult(pixels)

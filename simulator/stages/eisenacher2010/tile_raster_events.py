@@ -26,11 +26,12 @@ HALF_WARP = 16  # lanes that load the edges of a grid together
 VECTOR_BYTES = 16  # a vertex; and the width of a load
 VECTOR_WORDS = 4
 WORD_BYTES = 4
-EDGE_VECTORS = 27  # a grid: 12 floats a quad, where edge equations are loaded
+EDGE_VECTORS, SHORT_VECTORS = 27, 14  # a grid: 12 floats a quad, where edge equations are loaded, or 16-bit terms
 ALIGNMENTS = 8  # ways in which a number of vectors lie in 128-byte segments
+SHORT = ("half", "fixed", "snapped")  # edge equations in 16 bits
 SEGMENT_WORDS = SEGMENT_BYTES // WORD_BYTES  # places in a segment where the pixels of a tile may begin
 BROADCAST_LOADS = 4  # vertices that each lane reads for a quad
-EDGE_LOADS = 3  # vectors that each lane reads for the edges of a quad
+EDGE_LOADS, SHORT_LOADS = 3, 2  # vectors that each lane reads for the edges of a quad
 _HALF_WARP = int(Coalescing.HALF_WARP_SEGMENTS)
 
 
@@ -99,7 +100,7 @@ class BlockShape(NamedTuple):
     warps: int
     coalescing: int
     box_tests: bool
-    loaded: bool  # edge equations are loaded
+    loaded: int  # vectors of edge equations that are loaded for a grid
     grid: int = GRID_SIDE  # vertices a side
 
 
@@ -112,13 +113,16 @@ class BlockTraffic(NamedTuple):
     resolve_replays: int  # of a block
 
 
-def block_shape(tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool, grid: int = GRID_SIDE) -> BlockShape:
-    """Shape of a block of ``tile**2`` threads, for grids of ``grid`` vertices a side."""
+def block_shape(
+    tile: int, spp: int, simt: Simt, *, box_tests: bool, loaded: bool, grid: int = GRID_SIDE, short: bool = False
+) -> BlockShape:
+    """Shape of a block of ``tile**2`` threads; ``grid`` vertices are a side of a grid; ``short`` edges have 16 bits."""
     side = {1: 1, 4: 2, 16: 4}[spp]
     bits = simt.warp.bit_length() - 1
     warps = -(-tile * tile // simt.warp)
     return BlockShape(
-        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests, loaded,
+        tile, side, side.bit_length() - 1, tile / side, simt.warp, bits, warps, int(simt.coalescing), box_tests,
+        loaded * (SHORT_VECTORS if short else EDGE_VECTORS),
         grid,
     )  # fmt: skip
 
@@ -128,15 +132,18 @@ def shape_for(
 ) -> BlockShape:
     """Shape of the blocks that draw these grids."""
     side = math.isqrt(vertices.shape[1])
-    return block_shape(tiles.size, spp, simt, box_tests=box_tests, loaded=edges == "loaded", grid=side)
+    return block_shape(
+        tiles.size, spp, simt, box_tests=box_tests, loaded=edges != "computed", grid=side, short=edges in SHORT
+    )
 
 
 def block_traffic(shape: BlockShape, simt: Simt) -> BlockTraffic:
     """Count what is alike in all blocks."""
     edges = np.zeros((ALIGNMENTS, 2), np.int64)
     for place in range(ALIGNMENTS):
-        base = place * EDGE_VECTORS * VECTOR_BYTES
-        for first, count in ((0, HALF_WARP), (HALF_WARP, EDGE_VECTORS - HALF_WARP)):
+        base = place * shape.loaded * VECTOR_BYTES
+        for first in range(0, shape.loaded, HALF_WARP):
+            count = min(HALF_WARP, shape.loaded - first)
             address = (np.arange(count, dtype=np.int64) + first) * VECTOR_BYTES + base
             edges[place] += transactions(address, count, VECTOR_BYTES, shape.coalescing)
     full = min(shape.warp, shape.tile**2)
@@ -199,14 +206,15 @@ def count_block(
         row[_E.SUBTILE_PASS] = quads * subtiles
         row[_E.BOX_WARPS] = quads * subtiles * shape.warps
         row[_E.BOX_LANES] = quads * subtiles * threads
-    row[_E.EDGE_SETUP_WARPS] = 0 if shape.loaded else row[_E.BOX_WARPS]
+    row[_E.EDGE_SETUP_WARPS] = 0 if shape.loaded > 0 else row[_E.BOX_WARPS]
     row[_E.SAMPLE_TESTS] = row[_E.BOX_WARPS] * min(shape.warp, threads)
     row[_E.SAMPLE_HITS] = row[_E.HIT_LANES]
     _count_loads(block, lists, first, grids, shape, traffic, row)
     row[_E.SHARED_ACCESSES] += row[_E.GATHER_WARPS] + BROADCAST_LOADS * row[_E.QUAD_WARPS]
     row[_E.BANK_REPLAYS] += row[_E.GATHER_WARPS] * traffic.gather_replays
-    if shape.loaded:
-        row[_E.SHARED_ACCESSES] += row[_E.EDGE_GATHER_WARPS] + EDGE_LOADS * row[_E.BOX_WARPS]
+    if shape.loaded > 0:
+        reads = EDGE_LOADS if shape.loaded == EDGE_VECTORS else SHORT_LOADS
+        row[_E.SHARED_ACCESSES] += row[_E.EDGE_GATHER_WARPS] + reads * row[_E.BOX_WARPS]
         row[_E.BANK_REPLAYS] += row[_E.EDGE_GATHER_WARPS] * traffic.gather_replays
     row[_E.BARRIERS] = 2 * row[_E.BATCH_WARPS]
     if subtiles == 1:
@@ -240,9 +248,9 @@ def _count_loads(
             count, size = contiguous((first + i) * WORD_BYTES, indices * WORD_BYTES, shape.coalescing)
             row[_E.LOAD_TRANSACTIONS] += count
             row[_E.LOAD_BYTES] += size
-        if shape.loaded:
-            row[_E.EDGE_GATHER_WARPS] += 2 * warps
-            row[_E.EDGE_GATHER_LANES] += loaded * EDGE_VECTORS
+        if shape.loaded > 0:
+            row[_E.EDGE_GATHER_WARPS] += (shape.loaded + HALF_WARP - 1) // HALF_WARP * warps
+            row[_E.EDGE_GATHER_LANES] += loaded * shape.loaded
             for i in range(base, base + loaded):
                 row[_E.LOAD_TRANSACTIONS] += traffic.edges[lists[first + i] % ALIGNMENTS, 0]
                 row[_E.LOAD_BYTES] += traffic.edges[lists[first + i] % ALIGNMENTS, 1]

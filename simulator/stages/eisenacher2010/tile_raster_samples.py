@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.eisenacher2010.edge_equations import covers
 
 GRID_SIDE = 4  # vertices
 QUADS = 9  # a grid
@@ -69,11 +70,21 @@ def sample_span(low: Any, high: Any, origin: Any, side: int, samples: int) -> tu
 
 @kernel(lent=True)
 def sample_quad(
-    vertices: Any, colors: Any, grid: int, v: int, span: Any, origin: Any, shape: Any, samples: Samples, row: Any
+    vertices: Any,
+    colors: Any,
+    stored: Any,
+    grid: int,
+    v: int,
+    span: Any,
+    origin: Any,
+    shape: Any,
+    samples: Samples,
+    row: Any,
 ) -> tuple[int, int, int, int]:
     """Test the samples of ``span`` (columns and rows of the tile's samples, inside one sub-tile); keep the nearest.
 
     Of a sample that is kept the blended colour stays, or the number of the quad's first vertex where no ``colors`` are.
+    ``stored`` edge equations decide what is covered, where there are such.
     Returns the warps and lanes that cover a sample, and those that pass the z-test; 0 where ``row`` is None.
     """
     b, c, d = v + 1, v + shape.grid + 1, v + shape.grid
@@ -91,7 +102,10 @@ def sample_quad(
             e1 = edge(bx, by, cx, cy, x, y)
             e2 = edge(cx, cy, dx, dy, x, y)
             e3 = edge(dx, dy, ax, ay, x, y)
-            if not (
+            if stored is not None:
+                if not covers(stored, grid, v, x, y):
+                    continue
+            elif not (
                 (e0 >= _ZERO and e1 >= _ZERO and e2 >= _ZERO and e3 >= _ZERO)
                 or (e0 <= _ZERO and e1 <= _ZERO and e2 <= _ZERO and e3 <= _ZERO)
             ):
