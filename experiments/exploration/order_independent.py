@@ -233,9 +233,9 @@ def _bounded(table: "pd.DataFrame") -> str:
 
 SURE = (
     "Counts and pictures are exact; times are priced from our CUDA code (9.0) or by hand (2.x), none but the resolve "
-    "pass was measured. The GTX 480's 19.3 ns an atomic at one address is fitted, to Figure 5. Nodes of a tile lie side by "
-    "side here, where tiles of a GPU that run at once take theirs by turns. k-buffers and samples have the 48 KB of "
-    "shared memory a block that the original has, on every machine."
+    "pass was measured. The GTX 480's 19.3 ns an atomic at one address is fitted, to Figure 5. Nodes of a tile lie "
+    "side by side here, where tiles of a GPU that run at once take theirs by turns. k-buffers and samples have the "
+    "48 KB of shared memory a block that the original has, on every machine."
 )
 
 
