@@ -84,7 +84,7 @@ def k_buffer(entries, k):
     """Keep the k nearest; blend what falls out, and at the end the rest, farthest first."""
     color, kept = 0, []
     for entry in entries:
-        kept = sorted([*kept, entry], key=lambda fragment: fragment[1])
+        kept = sorted([entry, *kept], key=lambda fragment: fragment[1])  # of equal depths the later in front
         if len(kept) > k:
             color = over(kept.pop()[0], color)
     return folded(over, reversed(kept), color)

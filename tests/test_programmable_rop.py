@@ -86,6 +86,13 @@ def test_a_k_buffer_as_deep_as_the_scene_blends_in_order_of_depth():
     assert np.array_equal(picture(what, "k-buffer", 12), in_order)
 
 
+def test_of_equal_depths_a_k_buffer_has_the_later_in_front():
+    positions, triangles, _, size = layer(1.0, (8, 8))
+    colors = np.repeat([[1, 0, 0, 1], [0, 1, 0, 0.5]], 3, axis=0).astype(np.float32)
+    twice = np.tile(positions, (2, 1)), [*triangles, [3, 4, 5]], colors
+    assert np.array_equal(picture(twice, "k-buffer", 4, size), picture(twice, "over", 4, size))
+
+
 def layer(alpha, size):
     return (
         [[-1, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]],
@@ -131,6 +138,21 @@ def test_steps_are_those_of_the_busiest_pixel_of_each_round():
     assert work.total(E.ROP_LANES) == len(order)
     assert work.total(E.LAYER_STEPS) == 3 * steps
     assert work.total(E.RESOLVE_LAYERS) == 2 * 3
+
+
+def test_a_program_that_reads_depths_loads_a_plane_for_each_triangle_of_a_round():
+    what, size = soup(5, 40), (8, 8)
+    places = [(t, y, 7 - x) for (y, x), entries in naive.fragments(*what, size).items() for _, _, t in entries]
+    drawn = [t for t, *_ in sorted(places)]
+    planes = sum(len(set(drawn[i : i + 32])) for i in range(0, len(drawn), 32))
+    programs = BlendProgram(screen), "max"  # both of one word, and so of 20 warps
+    reads, reads_not = (draw(what, program, size=size).works[0].total(E.LOAD_TRANSACTIONS) for program in programs)
+    assert reads - reads_not == planes
+
+
+def test_setup_makes_depths_only_for_programs_that_read_them():
+    setup = {name: frame(name).stages.loc["triangle_setup"].instructions for name in ("max", "nearest", "k-buffer")}
+    assert setup["max"] < setup["nearest"] == setup["k-buffer"]
 
 
 @pytest.mark.parametrize(("program", "layers", "warps"), [("over", 4, 20), ("k-buffer", 4, 10), ("k-buffer", 16, 4)])

@@ -57,7 +57,7 @@ struct KBuffer : Blend {
 #pragma unroll 1
     for (int i = 1; i < n; i += 2) {
       u32 old_z = w[64 * i + 64 + p], old_c = w[64 * i + p];
-      bool nearer = z < old_z;
+      bool nearer = z <= old_z;
       w[64 * i + p] = nearer ? c : old_c;
       w[64 * i + 64 + p] = nearer ? z : old_z;
       c = nearer ? old_c : c;

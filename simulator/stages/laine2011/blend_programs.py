@@ -89,7 +89,7 @@ def blend(pixel: Any, program: int, color: int, depth: int, key: int) -> None:
             pixel[0], pixel[1] = color, depth
     elif program == K_BUFFER:
         for i in range(1, pixel.size, 2):
-            if depth < pixel[i + 1]:
+            if depth <= pixel[i + 1]:  # of equal depths the later lies in front
                 pixel[i], color = color, pixel[i]
                 pixel[i + 1], depth = depth, pixel[i + 1]
         if depth < FARTHEST:
