@@ -110,6 +110,15 @@ def test_a_nearer_polygon_on_the_same_samples_is_not_merged():
     assert shade(given_polygons(HALVES[0], nearer), 4)[2].total(QuadEvent.SHADED_QUADS) == 2
 
 
+def test_a_quad_passes_none_that_has_one_of_its_samples():
+    """It could join the first, whose side it faces; but the second covers its samples and is written after it."""
+    left = square((0, 0), (1, 0), (1, 2), (0, 2))
+    away = square((1, 0), (1, 2), (2, 2), (2, 0))
+    nearer = square((1, 0), (2, 0), (2, 2), (1, 2), depth=0.25)
+    assert shade(given_polygons(left, nearer), 4, shared=0)[2].total(QuadEvent.SHADED_QUADS) == 1
+    assert shade(given_polygons(left, away, nearer), 4, shared=0)[2].total(QuadEvent.SHADED_QUADS) == 3
+
+
 def test_the_pipeline_shades_what_is_on_screen():
     options = {"width": 48, "height": 36, "spp": 4, "stamp": 2}
     plain, quads, merged = (

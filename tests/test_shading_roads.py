@@ -1,9 +1,11 @@
 """Roads not taken in shading: each experiment runs in small, draws, and says what its numbers say."""
 
+import numpy as np
 import pytest
 
 from tilestamp.experiments.exploration import compaction, decoupled, derivatives, quad_merging
 from tilestamp.experiments.harness.write import draw_figure
+from tilestamp.experiments.stability import merged_quads
 
 SMALL = {
     decoupled: {
@@ -50,3 +52,14 @@ def test_merging_divides_shading_of_pixel_sized_triangles_by_about_eight(spp, ai
 
 def test_a_mesh_covers_every_sample_once():
     assert quad_merging.shaded(quad_merging.mesh(2.0), 16, 0)[1].min() >= 1
+
+
+@pytest.mark.parametrize(("spp", "holds", "breaks"), [(4, 15.0, 19.0), (16, 21.0, 27.0)])
+def test_creases_show_merged_quads_from_about_twenty_degrees_on(spp, holds, breaks):
+    off = [np.abs(np.subtract(*map(np.int64, merged_quads.pictures(fold, spp)))).max() for fold in (holds, breaks)]
+    assert off[0] <= merged_quads.WRONG < off[1]
+
+
+def test_at_one_sample_a_pixel_no_crease_shows():
+    plain, merged = merged_quads.pictures(80.0, 1)
+    assert (plain == merged).all()

@@ -165,9 +165,9 @@ def _answer(table: "pd.DataFrame", buffers: "pd.DataFrame") -> str:
     )
     return (
         f"Triangles with legs of a pixel are shaded {corner.plain[max(SAMPLES)]:.1f} times a pixel in quads at"
-        f" {max(SAMPLES)} samples; a buffer of {BUFFER} entries divides that by (published: {PUBLISHED:g}), by the rule"
-        f" of who are neighbours, and at {min(SAMPLES)} samples: {by_rule}. {enough} entries give 90 % of what"
-        f" {max(ENTRIES)} give."
+        f" {max(SAMPLES)} samples. A buffer of {BUFFER} entries divides that by a factor that depends on who are"
+        f" neighbours (published: {PUBLISHED:g}; in brackets at {min(SAMPLES)} samples): {by_rule}. {enough} entries"
+        f" give 90 % of what {max(ENTRIES)} give."
     )
 
 
@@ -183,7 +183,8 @@ def _notes(buffers: "pd.DataFrame", frames: "pd.DataFrame") -> list[str]:
         (
             f"In software a warp that looks through {BUFFER} entries for every quad pays only with a shader of more"
             f" than {row.pays_from:.0f} instructions, by instructions issued (teapot, 4 samples, {MACHINE}; the mix is"
-            f" counted by hand); with one of 66 the stage takes {row.ms:.3f} ms with merging, {first.ms:.3f} without."
+            f" counted by hand); with one of 66 the stage, which waits for its longest warp,"
+            f" takes {row.ms:.3f} ms with merging and {first.ms:.3f} without."
         ),
         f"Merging changes the picture by a FLIP error of {row.flip:.5f}; at one sample a pixel, by none.",
         SURE,

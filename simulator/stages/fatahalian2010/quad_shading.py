@@ -144,7 +144,6 @@ def _quad_shading(
     table: Any,
 ) -> None:
     setup, buffer = new_setup(), new_buffer(max(entries, 1))
-    owner = np.full(len(shaded.seen), -1, np.int64)  # entry that each sample was last written by
     covers = np.zeros(PIXELS, np.bool_)
     for batch in range(len(table)):
         row = table[batch]
@@ -157,11 +156,9 @@ def _quad_shading(
                 for i in range(x0 >> (STEP_BITS + 1), (x1 >> (STEP_BITS + 1)) + 1):
                     mask = _visible(p, setup, samples, i, j, covers, row)
                     if mask != np.uint64(0):
-                        _offer(
-                            p, facing, i, j, mask, covers, corners, shared, samples, entries, buffer, owner, shaded, row
-                        )
+                        _offer(p, facing, i, j, mask, covers, corners, shared, samples, entries, buffer, shaded, row)
         while buffer.span[0] < buffer.span[1]:
-            _shade(buffer, samples, owner, shaded, row)
+            _shade(buffer, samples, shaded, row)
         _count_batch(entries, simt, row)
 
 
@@ -189,7 +186,7 @@ def _visible(p: int, setup: Any, samples: Samples, i: int, j: int, covers: Any, 
 @kernel
 def _offer(
     p: int, facing: int, i: int, j: int, mask: Any, covers: Any, corners: Any, shared: int, samples: Samples,
-    entries: int, buffer: MergeBuffer, owner: Any, shaded: ShadedQuads, row: Any,
+    entries: int, buffer: MergeBuffer, shaded: ShadedQuads, row: Any,
 ) -> None:  # fmt: skip
     """Put one quad into the buffer, the oldest entry making room where it joins none of a full one."""
     spp, place = len(samples.offsets), j * ((samples.width + 1) >> 1) + i
@@ -200,19 +197,14 @@ def _offer(
         row[QuadEvent.MERGED_QUADS] += 1
     else:
         if buffer.span[1] - buffer.span[0] == len(buffer.place):
-            _shade(buffer, samples, owner, shaded, row)
+            _shade(buffer, samples, shaded, row)
         entry = start(buffer, place, facing)
     join(buffer, entry, p, mask, covers, spp)
-    for k in range(PIXELS):
-        at = ((2 * j + (k >> 1)) * samples.width + 2 * i + (k & 1)) * spp
-        for s in range(spp):
-            if (mask >> np.uint64(k * spp + s)) & np.uint64(1):
-                owner[at + s] = entry
 
 
 @kernel
-def _shade(buffer: MergeBuffer, samples: Samples, owner: Any, shaded: ShadedQuads, row: Any) -> None:
-    """Shade the oldest entry and let it go; samples that a later quad has taken since keep that one's colour."""
+def _shade(buffer: MergeBuffer, samples: Samples, shaded: ShadedQuads, row: Any) -> None:
+    """Shade the oldest entry and let it go; of samples that a later quad has taken since, that one writes later."""
     i, spp, wide = buffer.span[0], len(samples.offsets), (samples.width + 1) >> 1
     e = i % len(buffer.place)
     buffer.span[0] += 1
@@ -223,7 +215,7 @@ def _shade(buffer: MergeBuffer, samples: Samples, owner: Any, shaded: ShadedQuad
         row[QuadEvent.HELPERS] += buffer.seen[e, k] < 0
         at = ((top + (k >> 1)) * samples.width + left + (k & 1)) * spp
         for s in range(spp):
-            if (buffer.mask[e] >> np.uint64(k * spp + s)) & np.uint64(1) and owner[at + s] == i:
+            if (buffer.mask[e] >> np.uint64(k * spp + s)) & np.uint64(1):
                 shaded.seen[at + s] = buffer.seen[e, k]
 
 

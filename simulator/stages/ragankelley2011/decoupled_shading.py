@@ -143,13 +143,12 @@ def _decoupled_shading(
     start: Any, end: Any, blur: Any, pattern: BlurPattern, samples: Samples, shading: Shading, everything: Any,
     made: ShadedSamples, table: Any,
 ) -> None:  # fmt: skip
-    cache = np.full((shading.cache, 3), -1, np.int64)  # polygon and cell, the last used first
+    cache = np.full((shading.cache, 3), -1, np.int64)  # polygon and cell, the last used first; no batch finds another's
     setup, polygon, key = new_setup(), np.empty(start.shape[1:], np.float32), np.zeros(3, np.int64)
     tile, _, spp, _ = pattern.place.shape
     for batch in range(len(table)):
         row = table[batch]
         row[DecoupledEvent.BATCHES] = 1
-        cache[:] = -1
         for p in range(batch * BATCH, min(len(start), (batch + 1) * BATCH)):
             x0, y0, x1, y1 = bound(start, end, blur, p, everything, samples)
             for pixel in range(max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0)):
