@@ -14,9 +14,9 @@ from tilestamp.simulator.scenes.pinhole import Pinhole, PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.splat_view import perspective
 from tilestamp.simulator.stages.kerbl2023.blend_step import blend_step
-from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs
+from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, keys_of
 from tilestamp.simulator.stages.kerbl2023.exponential import exp32
-from tilestamp.simulator.stages.kerbl2023.sort import key_bits, sort
+from tilestamp.simulator.stages.kerbl2023.sort import sort
 
 WIDTH, HEIGHT = 75, 50
 FORWARD = perspective(np.eye(4), 1.0, HEIGHT / WIDTH)
@@ -170,7 +170,25 @@ def test_a_pass_counts_the_runs_of_each_block():
 
 @pytest.mark.parametrize(("tiles", "bits"), [(8160, 45), (2170, 44), (129600, 49), (1, 33), (1024, 43)])
 def test_keys_have_the_bits_of_depth_and_of_the_number_of_tiles(tiles, bits):
-    assert key_bits(tiles) == bits
+    assert keys_of(tiles).sorted_bits == bits
+
+
+def test_keys_of_32_bits_take_four_passes_and_order_what_lies_far_enough_apart():
+    short, long = draw(key=32), draw(key=64)
+    assert [sum(work.kernel == "sort_onesweep" for work in run.frame.works) for run in (short, long)] == [4, 5]
+    depths, lists = short.frame.buffers["depths"], tile_lists(short)
+    assert {at: sorted(ours) for at, ours in lists.items()} == {
+        at: sorted(ours) for at, ours in tile_lists(long).items()
+    }
+    bits = keys_of(20, 4).depth_bits
+    step = np.float32(4.0) * 2.0 ** (23 - bits + 8 - 23)  # of depths under 4: a float's bits but the lowest
+    for ours in lists.values():
+        assert (np.diff(depths[ours]) > -step).all()
+
+
+def test_more_tiles_than_a_key_can_count_are_refused():
+    with pytest.raises(TilestampError, match="leave no bit of 32 for the depth"):
+        keys_of(2**31, 4)
 
 
 @settings(max_examples=200, deadline=None)

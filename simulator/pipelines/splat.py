@@ -26,13 +26,13 @@ from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.pinhole import Pinhole
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.kerbl2023.blend import Pixels, blend, blend_work
-from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate
+from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate, keys_of
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected, project
 from tilestamp.simulator.stages.kerbl2023.ranges import ranges
 from tilestamp.simulator.stages.kerbl2023.scan import scan
-from tilestamp.simulator.stages.kerbl2023.sort import key_bits, sort
+from tilestamp.simulator.stages.kerbl2023.sort import sort
 from tilestamp.simulator.stages.kerbl2023.tight_count import tight_count
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles, tiles_of
 from tilestamp.simulator.work import Work
@@ -58,6 +58,10 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     or those that the ellipse of that cut-off touches."""
     threads: Literal[32, 64, 128, 256, 512, 1024] | None = None
     """Threads of a block of the blending loop, fewer than a tile has pixels: each then has several; by default one."""
+
+    key: Literal[64, 32] = 64
+    """Bits of a key. Of 32 the tile leaves some for the depth, the highest: less is sorted, in fewer passes, and what
+    lies close together keeps the order of the file."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -108,9 +112,10 @@ def splat(
     if options.bound != "square":
         projected = execute(tight_count, projected, tiles, simt, bound=options.bound).outputs
     ends = execute(scan, projected.tiles, simt).outputs
-    pairs = execute(duplicate, projected, ends, tiles, simt, bound=options.bound).outputs
-    pairs = execute(sort, pairs, key_bits(tiles.total), simt).outputs
-    starts = execute(ranges, pairs.keys, tiles.total, simt).outputs
+    keys = keys_of(tiles.total, options.key // 8)
+    pairs = execute(duplicate, projected, ends, tiles, simt, bound=options.bound, keys=keys).outputs
+    pairs = execute(sort, pairs, keys.sorted_bits, simt).outputs
+    starts = execute(ranges, pairs.keys, tiles.total, simt, depth_bits=keys.depth_bits).outputs
     colours = colours_seen(splats, camera)
     threads = options.threads or options.pixels
     pixels, works, _ = execute(blend, starts, pairs.values, projected, colours, tiles, simt, threads=threads)
