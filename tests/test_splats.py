@@ -149,6 +149,33 @@ def test_counts_add_up(made, options):
     assert counts["blend.SLOWEST_TRIPS"] <= counts["blend.ENTRIES"] <= counts["blend.LIST"]
 
 
+@pytest.mark.parametrize("tile", [8, 16])
+def test_the_backward_pass_counts_what_each_pixel_walks_back_and_adds(tile):
+    plain, reduced = draw(tile=tile, gradients="lanes"), draw(tile=tile, gradients="reduced")
+    counts, less, buffers = plain.counts, reduced.counts, plain.frame.buffers
+    assert counts["gradients.EVALUATIONS"] == buffers["reached"].sum()
+    assert counts["gradients.ATOMIC_LANES"] == 9 * counts["blend.BLENDED"]
+    assert less["gradients.ATOMIC_LANES"] == 9 * counts["blend.BLEND_STEPS"]
+    assert counts["gradients.ATOMIC_CONFLICTS"] == 9 * (counts["blend.BLENDED"] - counts["blend.BLEND_STEPS"])
+    assert less["gradients.ATOMIC_CONFLICTS"] == 0
+    assert buffers["uses"].sum(axis=0).tolist() == [counts["blend.BLENDED"], counts["blend.BLEND_STEPS"]]
+    work = plain.frame.works[-1]
+    assert work.atomic_requests.sum() == counts["gradients.ATOMIC_REQUESTS"]
+    walked = sum(
+        max(buffers["reached"][y : y + 32 // tile, x : x + tile].max(), 0)
+        for x in range(0, WIDTH, tile)
+        for top in range(0, HEIGHT, tile)
+        for y in range(top, min(top + tile, HEIGHT), 32 // tile)
+    )
+    assert counts["gradients.WALK_STEPS"] == walked
+
+
+def test_atomics_of_a_warp_that_adds_up_first_take_less_time():
+    made = [simulate("playbot", "splat", "h200", width=480, height=360, gradients=how) for how in ("lanes", "reduced")]
+    lanes, reduced = (run.stages.loc["gradients", "milliseconds"] for run in made)
+    assert reduced < lanes
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(0, 2**45 - 1), max_size=200), st.integers(33, 48))
 def test_the_sort_is_stable_by_the_lowest_bits(keys, bits):
