@@ -14,9 +14,9 @@ from tilestamp.simulator.scenes.pinhole import Pinhole, PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.splat_view import perspective
 from tilestamp.simulator.stages.kerbl2023.blend_step import blend_step
-from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs
+from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, keys_of
 from tilestamp.simulator.stages.kerbl2023.exponential import exp32
-from tilestamp.simulator.stages.kerbl2023.sort import key_bits, sort
+from tilestamp.simulator.stages.kerbl2023.sort import sort
 
 WIDTH, HEIGHT = 75, 50
 FORWARD = perspective(np.eye(4), 1.0, HEIGHT / WIDTH)
@@ -149,6 +149,33 @@ def test_counts_add_up(made, options):
     assert counts["blend.SLOWEST_TRIPS"] <= counts["blend.ENTRIES"] <= counts["blend.LIST"]
 
 
+@pytest.mark.parametrize("tile", [8, 16])
+def test_the_backward_pass_counts_what_each_pixel_walks_back_and_adds(tile):
+    plain, reduced = draw(tile=tile, gradients="lanes"), draw(tile=tile, gradients="reduced")
+    counts, less, buffers = plain.counts, reduced.counts, plain.frame.buffers
+    assert counts["gradients.EVALUATIONS"] == buffers["reached"].sum()
+    assert counts["gradients.ATOMIC_LANES"] == 9 * counts["blend.BLENDED"]
+    assert less["gradients.ATOMIC_LANES"] == 9 * counts["blend.BLEND_STEPS"]
+    assert counts["gradients.ATOMIC_CONFLICTS"] == 9 * (counts["blend.BLENDED"] - counts["blend.BLEND_STEPS"])
+    assert less["gradients.ATOMIC_CONFLICTS"] == 0
+    assert buffers["uses"].sum(axis=0).tolist() == [counts["blend.BLENDED"], counts["blend.BLEND_STEPS"]]
+    work = plain.frame.works[-1]
+    assert work.atomic_requests.sum() == counts["gradients.ATOMIC_REQUESTS"]
+    walked = sum(
+        max(buffers["reached"][y : y + 32 // tile, x : x + tile].max(), 0)
+        for x in range(0, WIDTH, tile)
+        for top in range(0, HEIGHT, tile)
+        for y in range(top, min(top + tile, HEIGHT), 32 // tile)
+    )
+    assert counts["gradients.WALK_STEPS"] == walked
+
+
+def test_atomics_of_a_warp_that_adds_up_first_take_less_time():
+    made = [simulate("playbot", "splat", "h200", width=480, height=360, gradients=how) for how in ("lanes", "reduced")]
+    lanes, reduced = (run.stages.loc["gradients", "milliseconds"] for run in made)
+    assert reduced < lanes
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(0, 2**45 - 1), max_size=200), st.integers(33, 48))
 def test_the_sort_is_stable_by_the_lowest_bits(keys, bits):
@@ -170,7 +197,25 @@ def test_a_pass_counts_the_runs_of_each_block():
 
 @pytest.mark.parametrize(("tiles", "bits"), [(8160, 45), (2170, 44), (129600, 49), (1, 33), (1024, 43)])
 def test_keys_have_the_bits_of_depth_and_of_the_number_of_tiles(tiles, bits):
-    assert key_bits(tiles) == bits
+    assert keys_of(tiles).sorted_bits == bits
+
+
+def test_keys_of_32_bits_take_four_passes_and_order_what_lies_far_enough_apart():
+    short, long = draw(key=32), draw(key=64)
+    assert [sum(work.kernel == "sort_onesweep" for work in run.frame.works) for run in (short, long)] == [4, 5]
+    depths, lists = short.frame.buffers["depths"], tile_lists(short)
+    assert {at: sorted(ours) for at, ours in lists.items()} == {
+        at: sorted(ours) for at, ours in tile_lists(long).items()
+    }
+    bits = keys_of(20, 4).depth_bits
+    step = np.float32(4.0) * 2.0 ** (23 - bits + 8 - 23)  # of depths under 4: a float's bits but the lowest
+    for ours in lists.values():
+        assert (np.diff(depths[ours]) > -step).all()
+
+
+def test_more_tiles_than_a_key_can_count_are_refused():
+    with pytest.raises(TilestampError, match="leave no bit of 32 for the depth"):
+        keys_of(2**31, 4)
 
 
 @settings(max_examples=200, deadline=None)

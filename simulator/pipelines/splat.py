@@ -5,6 +5,7 @@ Modelled
 - The forward pass of the published CUDA sources, operation by operation in float32 with its fused multiply-adds, and
   the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
+- The blending loop of the backward pass, counted (``gradients``): nine atomics a pixel and Gaussian, or a warp.
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.
 
 Not modelled
@@ -26,13 +27,14 @@ from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.pinhole import Pinhole
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.kerbl2023.blend import Pixels, blend, blend_work
-from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate
+from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate, keys_of
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
+from tilestamp.simulator.stages.kerbl2023.gradients import gradients
 from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected, project
 from tilestamp.simulator.stages.kerbl2023.ranges import ranges
 from tilestamp.simulator.stages.kerbl2023.scan import scan
-from tilestamp.simulator.stages.kerbl2023.sort import key_bits, sort
+from tilestamp.simulator.stages.kerbl2023.sort import sort
 from tilestamp.simulator.stages.kerbl2023.tight_count import tight_count
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles, tiles_of
 from tilestamp.simulator.work import Work
@@ -59,8 +61,17 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     threads: Literal[32, 64, 128, 256, 512, 1024] | None = None
     """Threads of a block of the blending loop, fewer than a tile has pixels: each then has several; by default one."""
 
+    key: Literal[64, 32] = 64
+    """Bits of a key. Of 32 the tile leaves some for the depth, the highest: less is sorted, in fewer passes, and what
+    lies close together keeps the order of the file."""
+
+    gradients: Literal["none", "lanes", "reduced"] = "none"
+    """Count the blending loop of the backward pass, too: its atomics by each lane, or added up in each warp before."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.gradients != "none" and self.threads not in (None, self.pixels):
+            raise TilestampError("gradients: the backward pass has a thread a pixel: leave out threads")
         if self.threads is not None and self.threads > self.pixels:
             raise TilestampError(f"threads: a tile of {self.tile} has {self.pixels} pixels, fewer than {self.threads}")
 
@@ -108,12 +119,16 @@ def splat(
     if options.bound != "square":
         projected = execute(tight_count, projected, tiles, simt, bound=options.bound).outputs
     ends = execute(scan, projected.tiles, simt).outputs
-    pairs = execute(duplicate, projected, ends, tiles, simt, bound=options.bound).outputs
-    pairs = execute(sort, pairs, key_bits(tiles.total), simt).outputs
-    starts = execute(ranges, pairs.keys, tiles.total, simt).outputs
+    keys = keys_of(tiles.total, options.key // 8)
+    pairs = execute(duplicate, projected, ends, tiles, simt, bound=options.bound, keys=keys).outputs
+    pairs = execute(sort, pairs, keys.sorted_bits, simt).outputs
+    starts = execute(ranges, pairs.keys, tiles.total, simt, depth_bits=keys.depth_bits).outputs
     colours = colours_seen(splats, camera)
     threads = options.threads or options.pixels
     pixels, works, _ = execute(blend, starts, pairs.values, projected, colours, tiles, simt, threads=threads)
+    if options.gradients != "none" and works:
+        inputs = (works[0], pixels, pairs.values, len(splats), tiles, simt)
+        execute(gradients, *inputs, atomics=options.gradients)
     lists = np.diff(starts)
     return Frame(
         np.clip(np.rint(pixels.colours * 255), 0, 255).astype(np.uint8),

@@ -76,6 +76,9 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"bound": "box"}),
         ("h200", {"bound": "ellipse", "tile": 8}),
         ("h200", {"threads": 64}),
+        ("h200", {"key": 32}),
+        ("h200", {"gradients": "lanes"}),
+        ("h200", {"gradients": "reduced"}),
     ),
 }
 

@@ -73,11 +73,14 @@ class Pixels(NamedTuple):
         What is left of the background.
     reached : ndarray, (H, W), uint32
         Place of the last entry that was blended in the list of its tile, from 1; 0 where there is none.
+    uses : ndarray, (P, 2), int32
+        Of each entry of all lists the pixels, and the steps of warps, that blend it; (0, 2) where nothing was counted.
     """
 
     colours: NDArray[np.float32]
     transmittance: NDArray[np.float32]
     reached: NDArray[np.uint32]
+    uses: NDArray[np.int32]
 
 
 @kernel(lent=True)
@@ -155,6 +158,7 @@ def _tile(
     room.rounds[:, :, :rounds] = 0
     room.totals[:] = 0
     room.marks[:count] = 0
+    room.uses[:count] = 0
     lasts = room.state.view(np.int32)
     for warp in range(block.warps):
         bit = np.uint32(1) << np.uint32(warp)
@@ -165,7 +169,7 @@ def _tile(
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
-                room.rounds[warp, slot], room.marks, bit, totals,
+                room.rounds[warp, slot], room.marks, room.uses, bit, totals,
             )  # fmt: skip
             _store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
             if row is not None:
@@ -202,7 +206,8 @@ def _blend(
         np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int32), np.empty((ROWS, lanes), np.float32),
         np.empty(block.parts, np.uint32),
         np.empty((block.warps, block.pixels, longest // block.threads + 1, PER_ROUND), np.int64),
-        np.empty((block.warps, block.pixels, TOTALS), np.int64), np.empty(longest, np.uint32),
+        np.empty((block.warps, block.pixels, TOTALS), np.int64),
+        np.empty(longest, np.uint32), np.empty((longest, 2), np.int64),
         np.zeros((2, len(out.radii) * CONIC_BYTES // block.segment + 1 if table is not None else 1), np.int64),
     )  # fmt: skip
     for i in range(begin, end):
@@ -214,6 +219,7 @@ def _blend(
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
             count_rounds(count, block, room, row)
+            pixels.uses[first : first + count] = room.uses[:count]
             row[_E.SKIPPED_ALPHA] = row[_E.EXP_LANES] - row[_E.BLENDED] - row[_E.STOPPED]
             row[_E.IDLE_LANES] = row[_E.STEPS] * block.warp - row[_E.EVALUATIONS]
             for size in range(0, row[_E.ENTRIES], block.threads):
@@ -260,7 +266,12 @@ def blend(
     works : one, a row a tile
     """
     shape = (tiles.height, tiles.width)
-    pixels = Pixels(np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32))
+    pixels = Pixels(
+        np.empty((*shape, 3), np.float32),
+        np.empty(shape, np.float32),
+        np.empty(shape, np.uint32),
+        np.zeros((len(listed) if counting else 0, 2), np.int32),
+    )
     block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     reaches = np.empty((len(colours), REACH), np.float32)

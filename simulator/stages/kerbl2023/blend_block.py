@@ -40,6 +40,7 @@ class Room(NamedTuple):
     rounds: NDArray[np.int64]  # (warps, pixels a thread, rounds, PER_ROUND)
     totals: NDArray[np.int64]  # (warps, pixels a thread, TOTALS)
     marks: NDArray[np.uint32]  # (longest list,): the warps that blend an entry, a bit each
+    uses: NDArray[np.int64]  # (longest list, 2): pixels and steps that blend an entry
     stamps: NDArray[np.int64]  # (2, sectors of the conics): by which gather a sector was touched last
 
 

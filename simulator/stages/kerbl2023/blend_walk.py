@@ -54,7 +54,7 @@ def reach_box(x: Any, y: Any, reach: Any, box: Any) -> None:
 @kernel(lent=True)
 def walk(
     entries: Any, boxes: Any, count: int, state: Any, lasts: Any, alive: Any, rectangle: Any, batch: int,
-    per_round: Any, marks: Any, bit: Any, totals: Any,
+    per_round: Any, marks: Any, uses: Any, bit: Any, totals: Any,
 ) -> None:  # fmt: skip
     """Walk along a list.
 
@@ -76,6 +76,8 @@ def walk(
         Added to.
     marks : ndarray, (>= count,), uint32
         Of each entry a bit for each warp in which it blends; those of ``bit`` are set.
+    uses : ndarray, (>= count, 2), int64
+        Of each entry the pixels, and the steps of warps, that blend it; added to.
     bit : uint32
     totals : ndarray, (TOTALS,), int64
         Added to.
@@ -112,6 +114,8 @@ def walk(
                 per_round[k // batch, ROUND_RUNS] += k != before + 1
                 before = k
                 marks[k] |= bit
+                uses[k, 0] += blended
+                uses[k, 1] += 1
         k += 1
     totals[EVALUATIONS] += living * (k - counted)
     totals[TRIPS] = k

@@ -165,3 +165,30 @@ class BlendEvent(IntEnum):
     STORE_TRANSACTIONS = 30
     STORE_BYTES = 31
     BLOCKS = 32
+
+
+@shown(
+    count("EVALUATIONS", "evaluations of a Gaussian at a pixel, from the last that it blended back", "sample_tests"),
+    count("BLENDED", "evaluations that have gradients", "sample_hits"),
+    ratio("ste", "BLENDED", "EVALUATIONS", "evaluations that have gradients by all"),
+)
+class GradientEvent(IntEnum):
+    """Events of one block of the backward pass, which is a tile."""
+
+    WARPS = 0
+    BATCHES = 1  # rounds: the whole list, from its end
+    ENTRIES = 2
+    STEPS = 3  # iterations of a warp over a list entry, whether it used the entry or not
+    WALK_STEPS = 4  # of them: with a lane that had come so far
+    EVALUATIONS = 5  # such lanes
+    BLEND_STEPS = 6  # with a lane that blended the entry: gradients
+    BLENDED = 7  # such lanes
+    REDUCED_STEPS = 8  # steps whose gradients a warp adds up before one lane adds them to memory
+    ATOMIC = 9  # instructions of warps: nine a step
+    ATOMIC_LANES = 10
+    ATOMIC_REQUESTS = 11
+    ATOMIC_CONFLICTS = 12
+    ATOMIC_DEPTH = 13
+    LOAD_TRANSACTIONS = 14
+    LOAD_BYTES = 15
+    BLOCKS = 16

@@ -10,23 +10,21 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.kerbl2023.duplicate import KEY_BYTES
 from tilestamp.simulator.stages.kerbl2023.events import RangesEvent
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads
-DEPTH_BITS = 32
 PAIR_BYTES = 8  # of a range: start and end
 _E = RangesEvent
 
 
 @kernel
-def _ranges(keys: Any, starts: Any, warp: int, segment: int, table: Any) -> None:
+def _ranges(keys: Any, depth_bits: int, starts: Any, warp: int, segment: int, table: Any) -> None:
     """Fill ``starts``; a thread whose pair is of another tile than the one before stores both ends."""
     tile = np.int64(0)
     before, last_warp, end_sector, start_sector = np.int64(-1), -1, np.int64(-1), np.int64(-1)
     for i in range(len(keys)):
-        here = np.int64(keys[i] >> np.uint64(DEPTH_BITS))
+        here = np.int64(keys[i] >> np.uint64(depth_bits))
         while tile <= here:
             starts[tile] = i
             tile += 1
@@ -48,16 +46,18 @@ def _ranges(keys: Any, starts: Any, warp: int, segment: int, table: Any) -> None
 
 
 def ranges(
-    keys: NDArray[np.uint64], tiles: int, simt: Simt, *, counting: bool = True
+    keys: NDArray[np.unsignedinteger], tiles: int, simt: Simt, *, depth_bits: int = 32, counting: bool = True
 ) -> StageResult[NDArray[np.int64]]:
     """Find where the list of each tile begins.
 
     Parameters
     ----------
-    keys : ndarray, (P,), uint64
+    keys : ndarray, (P,), uint64 or uint32
         Sorted.
     tiles : int
     simt : Simt
+    depth_bits : int
+        Of a key, below the tile.
     counting : bool
 
     Returns
@@ -70,15 +70,16 @@ def ranges(
     blocks = -(-len(keys) // BLOCK)
     table = np.zeros((blocks, len(_E)), np.int64) if counting and blocks else None
     segment = smallest_transaction_bytes(int(simt.coalescing))
-    _ranges(keys, starts, simt.warp, segment, table)
-    return StageResult(starts, () if table is None else (_work(table, len(keys), tiles, simt),))
+    _ranges(keys, depth_bits, starts, simt.warp, segment, table)
+    return StageResult(starts, () if table is None else (_work(table, keys, tiles, simt),))
 
 
-def _work(table: NDArray[np.int64], pairs: int, tiles: int, simt: Simt) -> Work:
+def _work(table: NDArray[np.int64], keys: NDArray[np.unsignedinteger], tiles: int, simt: Simt) -> Work:
+    pairs, size = len(keys), keys.itemsize
     lanes = np.full(len(table), BLOCK, np.int64)
     lanes[-1] = pairs - (len(table) - 1) * BLOCK
     table[:, _E.WARPS], table[:, _E.PAIRS], table[:, _E.BLOCKS] = -(-lanes // simt.warp), lanes, 1
-    one = -(-lanes * KEY_BYTES // SECTOR_BYTES)
+    one = -(-lanes * size // SECTOR_BYTES)
     table[:, _E.LOAD_TRANSACTIONS] = 2 * one + table[:, _E.WARPS]  # the key, and that of the thread before
     table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
     table[:, _E.STORE_BYTES] = table[:, _E.STORE_TRANSACTIONS] * SECTOR_BYTES
@@ -90,7 +91,7 @@ def _work(table: NDArray[np.int64], pairs: int, tiles: int, simt: Simt) -> Work:
         grid=len(table),
         block=BLOCK,
         streams=(
-            Stream("keys", "load", 2 * KEY_BYTES * pairs, KEY_BYTES * pairs),
+            Stream("keys", "load", 2 * size * pairs, size * pairs),
             Stream("ranges", "store", int(table[:, _E.STORE_BYTES].sum()), 8 * tiles),
         ),
     )

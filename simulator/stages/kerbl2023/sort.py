@@ -16,13 +16,12 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.kerbl2023.duplicate import KEY_BYTES, VALUE_BYTES, Pairs
+from tilestamp.simulator.stages.kerbl2023.duplicate import VALUE_BYTES, Pairs
 from tilestamp.simulator.stages.kerbl2023.events import SortEvent
 from tilestamp.simulator.work import Work
 
 DIGIT_BITS = 8
 RADIX = 1 << DIGIT_BITS
-DEPTH_BITS = 32
 BLOCK = 384  # threads of a pass
 ITEMS = 15  # pairs a thread
 SHARED_BYTES = 47104
@@ -34,11 +33,6 @@ BIN_SECTORS = RADIX * 4 // SECTOR_BYTES  # of a count of each digit
 BINS_STORED = 2  # by a block: its own counts, then those of all blocks up to it
 BINS_READ = 14  # by a block: where digits begin, and counts of blocks before it; as an H200 does in the mean
 _E = SortEvent
-
-
-def key_bits(tiles: int) -> int:
-    """Bits of a key that are sorted: 32 of depth, and as many as the number of tiles has."""
-    return DEPTH_BITS + tiles.bit_length()
 
 
 @kernel
@@ -87,19 +81,19 @@ def _scatter(
 
 
 @kernel(lent=True)
-def _run_sectors(place: int, start: int, count: int, warp: int) -> int:
+def _run_sectors(place: int, start: int, count: int, size: int, warp: int) -> int:
     """Sectors of a run that begins at a place of the sorted block: each instruction stores a warp's pairs of it."""
     sectors = 0
     while count:
         part = min(count, warp - place % warp)
-        for width in (KEY_BYTES, VALUE_BYTES):
+        for width in (size, VALUE_BYTES):
             sectors += ((start + part) * width - 1) // SECTOR_BYTES - start * width // SECTOR_BYTES + 1
         place, start, count = place + part, start + part, count - part
     return sectors
 
 
 @kernel
-def _count_runs(counts: Any, starts: Any, pairs: int, warp: int, table: Any) -> None:
+def _count_runs(counts: Any, starts: Any, pairs: int, key_bytes: int, warp: int, table: Any) -> None:
     """Events of the blocks of a pass: loads of whole blocks, stores of runs, and the digit counts of blocks before."""
     for block in range(len(counts)):
         row = table[block]
@@ -109,14 +103,14 @@ def _count_runs(counts: Any, starts: Any, pairs: int, warp: int, table: Any) -> 
         row[_E.BLOCKS] = row[_E.PASSES] = 1
         row[_E.LOAD_TRANSACTIONS] = BINS_READ * BIN_SECTORS
         row[_E.STORE_TRANSACTIONS] = BINS_STORED * BIN_SECTORS
-        for width in (KEY_BYTES, VALUE_BYTES):
+        for width in (key_bytes, VALUE_BYTES):
             row[_E.LOAD_TRANSACTIONS] += (size * width + SECTOR_BYTES - 1) // SECTOR_BYTES
         place = 0
         for digit in range(RADIX):
             count = counts[block, digit]
             if count:
                 row[_E.DIGITS] += 1
-                row[_E.STORE_TRANSACTIONS] += _run_sectors(place, starts[block, digit], count, warp)
+                row[_E.STORE_TRANSACTIONS] += _run_sectors(place, starts[block, digit], count, key_bytes, warp)
                 place += count
         row[_E.ALIKE], row[_E.MIXED] = row[_E.DIGITS] == 1, row[_E.DIGITS] > 1
         row[_E.LOAD_BYTES] = row[_E.LOAD_TRANSACTIONS] * SECTOR_BYTES
@@ -131,7 +125,7 @@ def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> Stage
     pairs : Pairs
         Overwritten.
     bits : int
-        Of the keys, the lowest so many are sorted: ``key_bits``.
+        Of the keys, the lowest so many are sorted.
     simt : Simt
     counting : bool
 
@@ -154,25 +148,26 @@ def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> Stage
         _starts(counts, starts)
         used[k] = counts.any(axis=0)
         if counting and count:
-            works.append(_pass_work(k, counts, starts, count, simt))
+            works.append(_pass_work(k, counts, starts, pairs, simt))
         for_parts(_scatter, parts, *pairs, shift, starts, *other)
         pairs, other = other, pairs
     if works:
-        works = [_histogram_work(count, used, simt), _sum_work(passes, simt), *works]
+        works = [_histogram_work(count, pairs.keys.itemsize, used, simt), _sum_work(passes, simt), *works]
     return StageResult(pairs, tuple(works))
 
 
-def _streams(count: int, *, back: bool) -> tuple[Stream, ...]:
+def _streams(count: int, key_bytes: int, *, back: bool) -> tuple[Stream, ...]:
     """What a pass reads and writes: keys and values, from one pair of buffers to the other."""
     names = ("", "2") if not back else ("2", "")
-    sizes = (("keys", KEY_BYTES), ("values", VALUE_BYTES))
+    sizes = (("keys", key_bytes), ("values", VALUE_BYTES))
     loads = [Stream(name + names[0], "load", size * count, size * count) for name, size in sizes]
     return (*loads, *(Stream(name + names[1], "store", size * count, size * count) for name, size in sizes))
 
 
-def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pairs: int, simt: Simt) -> Work:
+def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pairs: Pairs, simt: Simt) -> Work:
     table = np.zeros((len(counts), len(_E)), np.int64)
-    _count_runs(counts, starts, pairs, simt.warp, table)
+    count, key_bytes = len(pairs.keys), pairs.keys.itemsize
+    _count_runs(counts, starts, count, key_bytes, simt.warp, table)
     table[0, _E.DIGITS_USED] = np.count_nonzero(counts.any(axis=0))
     return Work(
         stage="sort",
@@ -182,12 +177,12 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
         grid=len(table),
         block=BLOCK,
         shared_bytes=SHARED_BYTES,
-        streams=_streams(pairs, back=k % 2 == 1),
+        streams=_streams(count, key_bytes, back=k % 2 == 1),
         variant=f"pass {k}",
     )
 
 
-def _histogram_work(pairs: int, used: NDArray[np.bool_], simt: Simt) -> Work:
+def _histogram_work(pairs: int, key_bytes: int, used: NDArray[np.bool_], simt: Simt) -> Work:
     """Persistent blocks, a fixed number an SM, that each count the digits of some tiles of keys, and add up at the end.
 
     ``used`` are the digits that occur, (passes, RADIX). A block is taken to have all of them: it adds each sector of
@@ -199,7 +194,7 @@ def _histogram_work(pairs: int, used: NDArray[np.bool_], simt: Simt) -> Work:
     table[:, _E.PAIRS] = (tiles // blocks + (np.arange(blocks) < tiles % blocks)) * HISTOGRAM_TILE
     table[(tiles - 1) % blocks, _E.PAIRS] -= tiles * HISTOGRAM_TILE - pairs
     table[:, _E.BLOCKS], table[:, _E.PASSES], table[:, _E.LISTED] = 1, len(used), table[:, _E.PAIRS] > 0
-    table[:, _E.LOAD_TRANSACTIONS] = -(-table[:, _E.PAIRS] * KEY_BYTES // SECTOR_BYTES)
+    table[:, _E.LOAD_TRANSACTIONS] = -(-table[:, _E.PAIRS] * key_bytes // SECTOR_BYTES)
     table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
     sectors = used.reshape(len(used), -1, COUNTS_A_SECTOR).any(axis=2)
     warps = used.reshape(len(used), -1, simt.warp).any(axis=2)
@@ -214,7 +209,7 @@ def _histogram_work(pairs: int, used: NDArray[np.bool_], simt: Simt) -> Work:
         grid=blocks,
         block=HISTOGRAM_BLOCK,
         shared_bytes=HISTOGRAM_SHARED_BYTES,
-        streams=(Stream("keys", "load", KEY_BYTES * pairs, KEY_BYTES * pairs),),
+        streams=(Stream("keys", "load", key_bytes * pairs, key_bytes * pairs),),
         atomic_requests=sectors.ravel() * table[:, _E.LISTED].sum(),
     )
 
