@@ -1,7 +1,8 @@
 """Stochastic rasterization: motion blur and defocus in tiles against the interval and the interleaved method.
 
 All three draw the same polygons, moved and defocused alike, at as many samples a pixel. Time is by their own mixes: of
-interval and interleaved from machine code (and on an H200 1.7 to 3.2 times too fast), of the tiles counted by hand.
+interval and interleaved from machine code (and on an H200 1.7 to 3.2 times too fast), of the tiles from machine
+code too, but lists by hand.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -166,8 +167,8 @@ def _notes(table: "pd.DataFrame", pictures: "pd.DataFrame", wrong: int) -> list[
             f" frame of {4 * WIDTH}x{4 * HEIGHT}; in float64 each sample is that of fractions (tests)."
         ),
         (
-            "Sure: pictures, tests and pairs. Not sure: times; no CUDA form of the tiles was compiled, and the other"
-            " two are known to be 1.7 to 3.2 times too fast on an H200."
+            "Sure: pictures, tests and pairs. Not sure: times; the lists are counted by hand, nothing of the tiles was"
+            " measured, and the other two are known to be 1.7 to 3.2 times too fast on an H200."
         ),
     ]
 
