@@ -263,3 +263,22 @@ def test_single_precision_is_wrong_in_few_samples():
 def test_patches_and_triangles_say_what_is_missing():
     with pytest.raises(TilestampError, match="neither patches nor triangles"):
         scene_triangles(Scene("nothing"), np.eye(4), 8, 8, 1.0)
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_left_and_top_edges_have_the_samples_on_them(turn):
+    """Two squares, one above the other, whose edges all run through samples at the corners of pixels."""
+    boxes = [(4, 2, 8, 4), (4, 4, 8, 9)]
+    halves = [[(a, b), (c, b), (c, d)][::turn] for a, b, c, d in boxes] + [
+        [(a, b), (c, d), (a, d)][::turn] for a, b, c, d in boxes
+    ]
+    flat = np.ones((4, 3, 4), np.float32)
+    flat[..., :2], flat[..., 2] = halves, 0
+    triangles = moving_triangles(flat, flat, Lens(0.0, 1.0), double=True)
+    pattern = BlurPattern(np.zeros((1, 1, SPP, 2), np.int64), np.zeros((1, 1, SPP, 3)))
+    samples, work = draw(triangles, everywhere(triangles), pattern)
+    shown = samples.polygon.reshape(HEIGHT, WIDTH, SPP)[..., 0] >= 0
+    expected = np.zeros((HEIGHT, WIDTH), bool)
+    expected[2:9, 4:8] = True
+    assert (shown == expected).all()
+    assert work.total(SampleRasterEvent.SAMPLE_HITS) == expected.sum() * SPP

@@ -31,11 +31,11 @@ def test_a_road_has_cells_sentences_and_pictures(small, tmp_path):
 
 
 def test_tiles_pay_for_large_polygons_and_not_for_small_ones():
-    """What the page says: a tenth of the interleaved method's time at 32 pixels, 20 times as long at 2."""
+    """What the page says: a seventh of the interleaved method's time at 32 pixels, 35 times as long at 2."""
     small, large = (
         stochastic.draw("tiles of 8, intervals", edge, motion=0.0, lens=0.0).milliseconds
         / stochastic.draw("interleaved", edge, motion=0.0, lens=0.0).milliseconds
         for edge in (2.0, 32.0)
     )
     assert small > 10
-    assert large < 0.2
+    assert large < 0.3

@@ -141,7 +141,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
         ),
         (
             "Sure: pictures and counts; in float64 each sample is that of a line of sight in fractions (tests)."
-            " Not sure: times, whose operations are counted by hand."
+            " Not sure: times; lists and tessellation are counted by hand, and nothing was measured."
         ),
     ]
 

@@ -9,7 +9,7 @@ Modelled
 Not modelled
 ------------
 - Vertex shading and shading: triangles come in eye space, a grey each.
-- Machine code: mixes are operations counted by hand, compute capability 9.0 alone.
+- Machine code of lists and tessellation: they are counted by hand. Compute capability 9.0 alone.
 """
 
 from typing import Annotated, Any, Literal

@@ -11,7 +11,7 @@ Not modelled
 - Dicing, vertex shading and shading: triangles come projected, a grey each.
 - Bounds of edges: a triangle larger than a tile is listed wherever its box is not cut by a plane.
 - Contraction to fused multiply-adds, which would make an edge differ between its two triangles on a GPU.
-- Machine code: mixes are operations counted by hand, compute capability 9.0 alone.
+- Machine code of the lists: they are counted by hand; the raster's is that of our kernel. Compute capability 9.0 alone.
 """
 
 from typing import Annotated, Any, Literal

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tilestamp.experiments.exploration import quad_merging
+from tilestamp.experiments.exploration import nonlinear, quad_merging
 from tilestamp.experiments.ste.setting import cube
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
@@ -73,3 +73,11 @@ def test_shade_moving_triangles_through_a_cache(benchmark, cache):
         decoupled_shading(moving, pattern, blur_samples(96, 96, pattern), Shading(1.0, cache, True), Simt())
 
     benchmark(draw)
+
+
+@pytest.mark.parametrize("method", ["rays", "tessellated"])
+def test_draw_a_fisheye_of_a_room(benchmark, method):
+    benchmark(
+        simulate, nonlinear.room(16), "nonlinear", width=320, height=240, camera=nonlinear.EYE, fidelity="counts",
+        method=method,
+    )  # fmt: skip

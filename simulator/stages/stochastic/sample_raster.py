@@ -1,7 +1,8 @@
 """Raster of moving triangles: one block a tile, one thread a pixel, one test for each sample that the mask leaves.
 
 Samples of the tile, and their nearest depth and triangle, stay in shared memory. A warp tests the samples of one number
-together: all lie in one interval of time and lens, so that the mask of an entry leaves out whole warp executions.
+together: all lie in one interval of time and lens, so that the mask of an entry leaves out whole warp executions. A
+line of sight (``ray_raster``) is tested alike. CUDA form: ``experiments/cuda/stochastic.cu``.
 """
 
 from enum import IntEnum
