@@ -52,6 +52,7 @@ METHODS: dict[str, dict[str, Any]] = {
     **{f"stochastic {s}": {"blend": "stochastic", "layers": s} for s in (4, 16)},
 }
 GROWN = (IN_ORDER, "linked", "chunked", "fixed 8", "k-buffer 4", "k-buffer 8", "stochastic 16")  # at all layers
+SECOND = (IN_ORDER, "linked", "round", "chunked", "fixed 8", "fixed 32", "k-buffer 4")  # on the second machine
 SHOWN = ("linked", IN_ORDER, "fixed 8", "k-buffer 4", "stochastic 16")
 HARDWARE = (2.1, 3.6)  # memory of a hardware A-buffer over a z-buffer's: Wittenbrink 2001, R-buffer, abstract
 
@@ -67,7 +68,7 @@ def run(progress: Progress) -> Result:
         for machine in MACHINES if layers == MIDDLE else MACHINES[:1]:
             truth = drawn(scene, TRUTH, machine)
             depth = truth.frame.facts["fragments_kept"] / SIDE**2
-            for method in METHODS if layers == MIDDLE else GROWN:
+            for method in GROWN if layers != MIDDLE else METHODS if machine == MACHINES[0] else SECOND:
                 made = truth if method == TRUTH else drawn(scene, method, machine)
                 rows.append({"layers": layers, "fragments": depth, "machine": machine, "method": method,
                              "kind": method.partition(" ")[0].strip(",")} | measured(made, truth, method))  # fmt: skip
