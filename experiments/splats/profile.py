@@ -1,9 +1,9 @@
 """gsplat's profile: frames a second of its garden on a TITAN RTX and on an MI300X, as its documentation has them.
 
 Its dense and packed paths and the original differ in what surrounds the same work: lists by squares of three sigmas,
-tiles of 16, a radix sort of 64-bit keys, 256 threads. We draw that; what differs is not modelled (Gaussians of radius 3
-and less are left out there: 2 % of the visible ones). Images of a batch follow each other here. Rows of 32 channels wait
-for an option; the 49 and 107 million Gaussians of grids 21 and 31 are left out, since they take minutes.
+tiles of 16, a radix sort of 64-bit keys, 256 threads. We draw that; what differs is not modelled (Gaussians of radius
+3 and less are left out there: 2 % of the visible ones). Images of a batch follow each other here. Rows of 32 channels
+wait for an option; the 49 and 107 million Gaussians of grids 21 and 31 are left out, since they take minutes.
 """
 
 from pathlib import Path
