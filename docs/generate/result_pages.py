@@ -1,6 +1,7 @@
 """Results: all experiments, and of a results folder (TILESTAMP_RESULTS) the stability atlas and the roads not taken.
 
-A page in ``docs/exploration`` says ``<!-- result exploration/NAME -->`` where the answer and the plots of a run belong.
+A page in ``docs/exploration`` says ``<!-- result exploration/NAME -->`` where the answer and the plots of a run belong,
+and ``docs/why-16x16.md`` likewise.
 """
 
 import json
@@ -21,7 +22,8 @@ from tilestamp.experiments.harness.registry import describe, describe_folder, ex
 
 RESULTS = "TILESTAMP_RESULTS"  # names what `tilestamp reproduce -o FOLDER` left
 ATLAS, ROADS = "stability", "exploration"
-RESULT = re.compile(r"<!-- result (exploration/[a-z]\w*) -->")  # not the NAME of an explanation
+SPLATS = "splats"  # experiments of the page why-16x16.md
+RESULT = re.compile(r"<!-- result ((?:exploration|splats)/[a-z]\w*) -->")  # not the NAME of an explanation
 EXPERIMENTS_HEAD = """# Experiments
 
 Each compares published or measured cells with ours, cell by cell, or answers a question.
@@ -47,8 +49,9 @@ def pages() -> dict[str, str | bytes]:
     """The list of experiments, the atlas and its pictures."""
     made: dict[str, str | bytes] = {"experiments.md": _experiments()} | _atlas()
     for name in experiment_names():
-        if name.startswith(f"{ROADS}/"):
-            made |= {f"{ROADS}/{place}": path.read_bytes() for place, path in _plots(name).items()}
+        folder = name.partition("/")[0]
+        if folder in {ROADS, SPLATS}:
+            made |= {f"{folder}/{place}": path.read_bytes() for place, path in _plots(name).items()}
     return made
 
 
@@ -61,7 +64,8 @@ def _found(name: str) -> str:
     """What a run found: its answer, what else it noted, its plots."""
     said = _said(name)
     told = [said["answer"], *(f"- {note}" for note in said["notes"] if note != said["answer"])] if said else []
-    return "\n\n".join([*told, *_drawn(name, _plots(name), describe(name).rstrip("."))])
+    room = f"{SPLATS}/" if name.startswith(f"{SPLATS}/") else ""
+    return "\n\n".join([*told, *_drawn(name, _plots(name), describe(name).rstrip("."), room)])
 
 
 def _result(name: str) -> Path | None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.silicon.splat_inputs import PIPELINE, Measured, measured_scenes, read_measured
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME, by_kernel, entry, sentences
+from tilestamp.experiments.splats.host import host_ms
 from tilestamp.experiments.validation.quantities import QUANTITIES, SHORTEST_US, TIME
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import load_machine
@@ -32,7 +33,6 @@ SOURCE = "One NVIDIA H200, CUDA 13.0, 2026-11-29: experiments/silicon/measured/s
 OURS = {"project": "preprocess", "blend": "render"}  # names of the published sources, where they are others
 AIMS = {TIME: 0.1, "instructions": 0.03, "load sectors": 0.05, "store sectors": 0.05}
 CLEAR = 0.1  # of the fastest tile's time: measured times that differ by more are told apart
-STOP_US = 50.0  # that the host needs to read the number of pairs and to launch on; measured 50 to 75 us with the gaps
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -85,7 +85,7 @@ def compared(measured: Measured) -> Iterator[dict[str, Any]]:
                 yield {"kernel": kernel} | entry(
                     quantity.name, quantity.ours(launch), sum(parts), AIMS[quantity.name], absolute=quantity.absolute
                 )
-    whole = total + STOP_US + machine.launch.graph_us * len(launches)
+    whole = total + 1e3 * host_ms(machine, len(launches))
     yield {"kernel": "frame"} | entry(FRAME_TIME, whole, measured.times[PIPELINE], None)
 
 

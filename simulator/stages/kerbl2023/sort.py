@@ -156,12 +156,13 @@ def sort(pairs: Pairs, bits: int, simt: Simt, *, counting: bool = True) -> Stage
     return StageResult(pairs, tuple(works))
 
 
-def _streams(count: int, key_bytes: int, *, back: bool) -> tuple[Stream, ...]:
-    """What a pass reads and writes: keys and values, from one pair of buffers to the other."""
+def _streams(count: int, key_bytes: int, stored: int, *, back: bool) -> tuple[Stream, ...]:
+    """What a pass reads and writes: keys and values, from one pair of buffers to the other; ``stored``: by sectors."""
     names = ("", "2") if not back else ("2", "")
     sizes = (("keys", key_bytes), ("values", VALUE_BYTES))
     loads = [Stream(name + names[0], "load", size * count, size * count) for name, size in sizes]
-    return (*loads, *(Stream(name + names[1], "store", size * count, size * count) for name, size in sizes))
+    pair = key_bytes + VALUE_BYTES
+    return (*loads, *(Stream(name + names[1], "store", stored * size // pair, size * count) for name, size in sizes))
 
 
 def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pairs: Pairs, simt: Simt) -> Work:
@@ -177,7 +178,7 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
         grid=len(table),
         block=BLOCK,
         shared_bytes=SHARED_BYTES,
-        streams=_streams(count, key_bytes, back=k % 2 == 1),
+        streams=_streams(count, key_bytes, int(table[:, _E.STORE_BYTES].sum()), back=k % 2 == 1),
         variant=f"pass {k}",
     )
 

@@ -1,0 +1,1 @@
+"""Gaussian splats: which tile, which GPU, and what others measured of them."""
