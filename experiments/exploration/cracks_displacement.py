@@ -9,12 +9,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way
 from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.stability.cracks import CURES, SEEDS, crack_pixels, frame, front_end, snapped
+from tilestamp.experiments.stability.cracks import CURES, SEEDS, Cure, crack_pixels, frame, front_end, snapped
 from tilestamp.experiments.stability.patch_frames import MACHINE, milliseconds
 from tilestamp.experiments.studies_shipped.finding import finding, reported
 from tilestamp.models.errors import TilestampError
@@ -80,11 +81,11 @@ def run(progress: Progress) -> Result:
 
 
 @cache
-def _truth(seed: int) -> Any:
+def _truth(seed: int) -> NDArray[np.float64]:
     return frame(TRUE_BOUND, seed, "one depth").image / 255.0
 
 
-def _cracked(bound: float, cure: Any) -> dict[str, Any]:
+def _cracked(bound: float, cure: Cure) -> dict[str, Any]:
     """Time, picture error and crack pixels of all sheets."""
     works = [work for seed in SEEDS for work in front_end(bound, seed, one_depth=cure == "one depth").works]
     works += [work for seed in SEEDS for work in frame(bound, seed, cure).works]
