@@ -17,7 +17,13 @@ from tilestamp.simulator.pipelines import pipeline_names
 ROOT = Path(__file__).parent.parent
 ROADS = sorted((ROOT / "docs" / "exploration").glob("*.md"))
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *ROADS, ROOT / "reports" / "gallery" / "README.md"])
-MADE = ("machines/", "pipelines/", "time/", "atlas.md")  # pages of the site that are made when it is built
+MADE = (
+    "machines/",
+    "pipelines/",
+    "time/",
+    "atlas.md",
+    "../atlas.md",
+)  # pages of the site that are made when it is built
 FLOORS = ("models", "simulator", "experiments", "reports")
 NEEDS_A_GPU = {"measure-machine", "validate"}
 

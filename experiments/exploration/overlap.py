@@ -9,6 +9,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, other_pixels
 from tilestamp.experiments.harness.registry import Progress
@@ -156,6 +157,6 @@ def _plot(ratios: "pd.DataFrame", path: "Path") -> None:
     )  # fmt: skip
 
 
-def _map(share: Any, path: "Path") -> None:
+def _map(share: NDArray[np.float64], path: "Path") -> None:
     title = "Coverage tests that sorted culling spares, by tile"
     heat_map(np.where(share > 0, share, np.nan), path, title=title, unit="tests spared [%]", size=SIZE, tile=8)

@@ -10,6 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import SIZE, Way, other_pixels
 from tilestamp.experiments.harness.registry import Progress
@@ -184,7 +185,7 @@ def _map(best: "pd.DataFrame", path: "Path") -> None:
     )
 
 
-def _lists(lists: Any, path: "Path") -> None:
+def _lists(lists: NDArray[np.int64], path: "Path") -> None:
     busy = lists[lists > 0]
     title = f"Grids in the list of each 32x32 tile: {busy.max()} at most, {np.mean(busy):.0f} in the mean"
     heat_map(lists, path, title=title, unit="grids", size=SIZE, tile=32)

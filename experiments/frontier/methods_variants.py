@@ -78,6 +78,8 @@ ROADS = [  # not taken by the papers (experiments/exploration)
     Variant("micropolygon", "masks, tile 4 in 16", {"coarse": 16, "tile": 4}),
     Variant("micropolygon", "16-bit edges, halves", {"edges": "half"}),
     Variant("micropolygon", "16-bit edges, snapped", {"edges": "snapped"}),
+    Variant("micropolygon", "bound 8, snapped edges: no cracks", {"bound": 8, "snap_edges": True}),
+    Variant("micropolygon", "bound 8, one depth: no cracks", {"bound": 8, "min_depth": 4}),
     Variant("micropolygon", "grids sorted and culled", {"cull": "sorted"}),
     Variant("micropolygon", "buckets, tile 8 in 32", {"coarse": 32, "second_level": "buckets"}),
 ]

@@ -20,7 +20,7 @@ Not modelled
 - The order in which atomics of different warps arrive: lists keep the order of blocks, so neighbours write closer
   together.
 - The paper's system overhead (4.6 ms of a frame): the experiments add it, not the pipeline.
-- Displacement, motion blur and transparency, of which the paper has none.
+- Motion blur and transparency, of which the paper has none. Displaced grids are lit as if they were not displaced.
 """
 
 from collections.abc import Mapping
@@ -49,6 +49,7 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.bucket_write import bucket_write
 from tilestamp.simulator.stages.eisenacher2010.culled_raster import Cull, culled_raster, dice_nearest
 from tilestamp.simulator.stages.eisenacher2010.dice import GRID_SIDE, Grids, dice
+from tilestamp.simulator.stages.eisenacher2010.displace import dice_displaced, padded
 from tilestamp.simulator.stages.eisenacher2010.edge_equations import snap_vertices
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
 from tilestamp.simulator.stages.eisenacher2010.link_grids import link_grids
@@ -114,6 +115,10 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
     paper)."""
     hybrid: bool = False
     """Give the diced grids to the fixed-function rasterizer."""
+    relief: NDArray[np.uint8] | None = None
+    """Displacement map laid over each patch: (H, W) bytes (not in the paper). Bounds leave room for it."""
+    relief_height: Annotated[float, Meta(ge=0)] = 0.0
+    """Units of the model that white in the relief moves a vertex along its normal."""
     texture: NDArray[np.uint8] | None = None
     """Laid over each patch: (H, W, 3 or 4) bytes."""
 
@@ -130,6 +135,9 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
             self.tile > FINE or self.spp > 1 or not self.box_tests or self.shading == "visible"
         ):
             raise TilestampError("edges of 16 bits: tiles of 4 or 8, one sample a pixel, box tests, shaded before")
+        roads = self.grid > GRID_SIDE or self.shading != "vertices" or self.cull != "none" or self.snap_edges
+        if self.relief is not None and (roads or self.bound_rule != "control_points"):
+            raise TilestampError("relief: grids of 4x4 vertices, each shaded by itself, bounded on control points")
         if self.coarse and (self.coarse <= self.tile or self.hybrid):
             raise TilestampError("coarse tiles are larger than tiles, and not for the hybrid")
         if self.has_masks and (self.tile > FINE or self.spp > 1 or not self.box_tests or self.edges != "computed"):
@@ -200,8 +208,12 @@ def micropolygon(
     view: dict[str, Any] = {"matrix": matrix, "width": width, "height": height, "simt": simt}
     fine = screen_tiles(width, height, options.tile, options.bound)
     tiles = screen_tiles(width, height, options.coarse, options.bound) if options.coarse else fine
+    split, bound = view, options.bound
+    if options.relief is not None:
+        room = padded(points, matrix, width, height, bound, options.relief_height)
+        bound, split = room.bound, view | {"matrix": room.matrix, "width": room.width, "height": room.height}
     subpatches = execute(
-        bound_and_split, points, **view, bound=options.bound, bound_rule=options.bound_rule, near=options.near,
+        bound_and_split, points, **split, bound=bound, bound_rule=options.bound_rule, near=options.near,
         min_depth=options.min_depth,
     ).outputs  # fmt: skip
     grids, shaded = _dice(points, subpatches, view, options, execute)
@@ -259,6 +271,10 @@ def _dice(
         links = execute(link_grids, subpatches, view["simt"]).outputs
         grids, _, facts = execute(dice_shared, points, subpatches, links, **view, **how, side=side)
         return grids, facts
+    if options.relief is not None:
+        relief: dict[str, Any] = {"relief": options.relief, "relief_height": options.relief_height}
+        grids, _, widest = execute(dice_displaced, points, subpatches, **view, **how, **relief)
+        return grids, {"shaded_vertices": shaded, **widest}
     if options.cull != "none":
         return execute(dice_nearest, points, subpatches, **view, **how).outputs, {"shaded_vertices": shaded}
     grids = execute(dice, points, subpatches, **view, **how, side=side).outputs

@@ -1,5 +1,6 @@
 """Speed of the roads not taken, by ``pytest tests/benchmarks --benchmark-only``: reported, never asserted."""
 
+import numpy as np
 import pytest
 
 from tilestamp.simulator.simulation import simulate
@@ -14,6 +15,7 @@ ROADS = [
     {"coarse": 16, "tile": 4},
     {"cull": "sorted"},
     {"edges": "fixed"},
+    {"bound": 8.0, "relief": np.eye(16, dtype=np.uint8) * np.uint8(255), "relief_height": 0.01},
     {"coarse": 32, "tile": 8, "second_level": "buckets"},
 ]
 

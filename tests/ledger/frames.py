@@ -48,6 +48,10 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"cull": "behind"}),
         *(("h200", {"edges": edges, "tile": tile}) for edges, tile in (("half", 4), ("fixed", 8))),
         ("gtx280", {"edges": "snapped"}),
+        *(
+            (machine, {"relief": TEXTURE[..., 0], "relief_height": 0.02, "bound": 8.0})
+            for machine in ("gtx280", "h200")
+        ),
         ("h200", {"grid": 7, "shading": "shared", "texture": TEXTURE}),
     ),
     "cudaraster": (
