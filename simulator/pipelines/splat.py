@@ -26,7 +26,8 @@ from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.pinhole import Pinhole
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.stages.kerbl2023.blend import Pixels, blend, blend_work
+from tilestamp.simulator.stages.kerbl2023.blend import blend, blend_work
+from tilestamp.simulator.stages.kerbl2023.blend_pixels import Pixels
 from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate, keys_of
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.gradients import gradients

@@ -5,7 +5,7 @@ pixel, blends it where alpha is 1/255 or more, and is done where the transmittan
 leaves before a round in which all are done. Colours are not in shared memory: each blend reads them by the index.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +26,15 @@ from tilestamp.simulator.stages.kerbl2023.blend_block import (
     count_rounds,
     gather_sectors,
 )
+from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, PLANES, Pixels, place, store
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
     ENTRY,
     ENTRY_RED,
     GX,
     LANES,
-    LAST,
     LEAST_ENTRY_POWER,
-    RED,
     ROWS,
-    TRANSMITTANCE,
     A,
-    X,
-    Y,
 )
 from tilestamp.simulator.stages.kerbl2023.blend_walk import (
     BOX,
@@ -53,34 +49,11 @@ from tilestamp.simulator.stages.kerbl2023.blend_walk import (
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
-from tilestamp.simulator.stages.laine2011.exact import fma
 from tilestamp.simulator.work import Work
 
 SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
-COLOURS, PLANES = 3, 5  # floats that a blend reads; words that a pixel stores
 _PART, _PART_GAUSSIANS = 8, 1 << 14  # tiles and Gaussians of one call, at least
 _E = BlendEvent
-
-
-class Pixels(NamedTuple):
-    """What the pixels show.
-
-    Parameters
-    ----------
-    colours : ndarray, (H, W, 3), float32
-        Blended over the background; neither clipped nor rounded.
-    transmittance : ndarray, (H, W), float32
-        What is left of the background.
-    reached : ndarray, (H, W), uint32
-        Place of the last entry that was blended in the list of its tile, from 1; 0 where there is none.
-    uses : ndarray, (P, 2), int32
-        Of each entry of all lists the pixels, and the steps of warps, that blend it; (0, 2) where nothing was counted.
-    """
-
-    colours: NDArray[np.float32]
-    transmittance: NDArray[np.float32]
-    reached: NDArray[np.uint32]
-    uses: NDArray[np.int32]
 
 
 @kernel(lent=True)
@@ -99,57 +72,6 @@ def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, rea
 
 
 @kernel(lent=True)
-def _place(tile: int, tiles: Tiles, first: int, end: int, room: Room) -> Any:
-    """Set up pixels of a tile: coordinates, who is on the screen; gives the rectangle around them."""
-    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
-    room.state[:] = 0
-    room.alive[:] = 0
-    p = first
-    while p < end:
-        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
-        run = min(left + tiles.tile_x - x, end - p)
-        for lane in range(p - first, p - first + run):
-            room.state[X, lane], room.state[Y, lane] = x, y
-            room.state[TRANSMITTANCE, lane] = 1
-            if x < tiles.width and y < tiles.height:
-                room.alive[lane // LANES] |= np.uint32(1) << np.uint32(lane % LANES)
-            x += 1
-        p += run
-    x, last = left + first % tiles.tile_x, min(end - first, tiles.tile_x) - 1
-    return x, x + last, top + first // tiles.tile_x, top + (end - 1) // tiles.tile_x
-
-
-@kernel(lent=True)
-def _store(
-    tile: int, tiles: Tiles, first: int, end: int, segment: int, background: Any, room: Room, pixels: Pixels, row: Any
-) -> None:
-    """Store the pixels of a warp; count the sectors of each row of pixels by itself."""
-    left, top = tile % tiles.columns * tiles.tile_x, tile // tiles.columns * tiles.tile_y
-    lasts = room.state.view(np.int32)
-    stored, p = 0, first
-    while p < end:
-        x, y = left + p % tiles.tile_x, top + p // tiles.tile_x
-        run = min(left + tiles.tile_x - x, end - p)
-        shown = max(min(run, tiles.width - x), 0) if y < tiles.height else 0
-        for i in range(shown):
-            lane = p - first + i
-            transmittance = room.state[TRANSMITTANCE, lane]
-            for k in range(COLOURS):
-                pixels.colours[y, x + i, k] = fma(background[k], transmittance, room.state[RED + k, lane])
-            pixels.transmittance[y, x + i] = transmittance
-            pixels.reached[y, x + i] = lasts[LAST, lane]
-        if row is not None and shown:
-            for plane in range(PLANES):
-                word = max(plane - 2, 0) * tiles.width * tiles.height + y * tiles.width + x
-                row[_E.STORE_TRANSACTIONS] += ((word + shown) * 4 - 1) // segment - word * 4 // segment + 1
-        stored += shown
-        p += run
-    if row is not None:
-        row[_E.PIXELS] += stored
-        row[_E.PIXEL_WARPS] += stored > 0
-
-
-@kernel(lent=True)
 def _tile(
     tile: int, tiles: Tiles, block: Block, count: int, background: Any, room: Room, pixels: Pixels, row: Any
 ) -> None:  # fmt: skip
@@ -165,13 +87,13 @@ def _tile(
         for slot in range(block.pixels):
             begin = slot * block.threads + warp * block.warp
             end = min(begin + block.warp, (slot + 1) * block.threads)
-            rectangle = _place(tile, tiles, begin, end, room)
+            rectangle = place(tile, tiles, begin, end, room)
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
                 room.rounds[warp, slot], room.marks, room.uses, bit, totals,
             )  # fmt: skip
-            _store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
+            store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
             if row is not None:
                 row[_E.STEPS] += totals[group.TRIPS]
                 row[_E.EVALUATIONS] += totals[group.EVALUATIONS]
@@ -193,14 +115,15 @@ def _reach(part: int, parts: int, out: Projected, reaches: Any) -> None:
 
 @kernel
 def _blend(
-    part: int, parts: int, drawn: Any, starts: Any, listed: Any, out: Projected, colours: Any, reaches: Any,
+    part: int, parts: int, starts: Any, listed: Any, out: Projected, colours: Any, reaches: Any,
     tiles: Tiles, block: Block, background: Any, pixels: Pixels, table: Any,
 ) -> None:  # fmt: skip
-    """Blend a part of the tiles; row i of the table is that of the i-th of them."""
-    begin, end = len(drawn) * part // parts, len(drawn) * (part + 1) // parts
+    """Blend a part of the tiles; row i of the table is that of tile i."""
+    count = len(starts) - 1
+    begin, end = count * part // parts, count * (part + 1) // parts
     longest = 1
-    for i in range(begin, end):
-        longest = max(longest, starts[drawn[i] + 1] - starts[drawn[i]])
+    for tile in range(begin, end):
+        longest = max(longest, starts[tile + 1] - starts[tile])
     lanes = block.parts * LANES
     room = Room(
         np.empty((longest, ENTRY), np.float32), np.empty((longest, BOX), np.int32), np.empty((ROWS, lanes), np.float32),
@@ -210,10 +133,9 @@ def _blend(
         np.empty(longest, np.uint32), np.empty((longest, 2), np.int64),
         np.zeros((2, len(out.radii) * CONIC_BYTES // block.segment + 1 if table is not None else 1), np.int64),
     )  # fmt: skip
-    for i in range(begin, end):
-        tile = drawn[i]
+    for tile in range(begin, end):
         first, count = starts[tile], starts[tile + 1] - starts[tile]
-        row = None if table is None else table[i]
+        row = None if table is None else table[tile]
         _load(first, count, listed, out, colours, reaches, room)
         _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
@@ -277,7 +199,7 @@ def blend(
     reaches = np.empty((len(colours), REACH), np.float32)
     for_parts(_reach, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
     inputs = (starts, listed, projected, colours, reaches, tiles, block, over, pixels, table)
-    for_parts(_blend, parts_of(tiles.total, _PART), np.arange(tiles.total), *inputs)
+    for_parts(_blend, parts_of(tiles.total, _PART), *inputs)
     return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
 
 

@@ -16,7 +16,7 @@ from tilestamp.models.coalescing import SECTOR_BYTES
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.kerbl2023.blend import Pixels
+from tilestamp.simulator.stages.kerbl2023.blend_pixels import Pixels
 from tilestamp.simulator.stages.kerbl2023.events import BlendEvent, GradientEvent
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
 from tilestamp.simulator.work import Work
