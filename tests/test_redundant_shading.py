@@ -6,7 +6,7 @@ import pytest
 from tests import naive_patches
 from tests.naive_tiles import naive_raster
 from tests.test_dice import SIZE, VIEW, flat, squares
-from tests.test_tile_raster import HEIGHT, WIDTH, drawn
+from tests.test_tile_raster import HEIGHT, WIDTH, drawn, some_grids
 from tilestamp.experiments.exploration import redundant_shading
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
@@ -17,8 +17,10 @@ from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GRID_SIDES
 from tilestamp.simulator.stages.eisenacher2010.link_grids import NEIGHBOURS, LinkEvent, link_grids
+from tilestamp.simulator.stages.eisenacher2010.shade_visible import PixelEvent, _pixel_work
 from tilestamp.simulator.stages.eisenacher2010.shared_vertices import SharedVertexEvent, dice_shared, own_vertices
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND as BACKGROUND_ID
 
 H200, GTX280 = load_machine("h200").simt, load_machine("gtx280").simt
 TREE = squares(  # of two urPatches, of two sizes
@@ -183,3 +185,20 @@ def test_a_dearer_shader_makes_shading_less_pay_sooner_or_later():
 def test_what_does_not_go_together_is_refused(options):
     with pytest.raises(TilestampError, match=r"^(grid|shading)"):
         MicropolygonOptions(**options)
+
+
+def test_blending_loads_the_four_vertices_of_each_quad_and_marking_stores_a_word_a_grid():
+    ids = drawn(some_grids(200), ids=True)[0]
+    seen = ids != BACKGROUND_ID
+    warps = np.split(ids.reshape(-1), range(32, ids.size, 32))
+    for offsets, size, bytes_a_record in (([0, 1, 4, 5], 16, 1), ([0], 4, 16)):
+        work = _pixel_work("kernel", ids, 4, np.array(offsets), 200, H200)
+        sectors = sum(
+            len({(int(i) + o) // bytes_a_record * size // 32 for i in warp[warp != BACKGROUND_ID]})
+            for warp in warps
+            for o in offsets
+        )
+        pixels = sum(-(-len(warp) * 4 // 32) for warp in warps)
+        own = (PixelEvent.LOAD_TRANSACTIONS, PixelEvent.STORE_TRANSACTIONS)
+        assert sum(work.total(event) for event in own) == sectors + pixels * (2 if len(offsets) > 1 else 1)
+        assert work.total(PixelEvent.SEEN_LANES) == seen.sum()

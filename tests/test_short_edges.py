@@ -131,3 +131,14 @@ def test_few_pixels_of_the_teapot_change():
 def test_what_does_not_go_together_is_refused(options):
     with pytest.raises(TilestampError, match=r"^edges of 16 bits"):
         MicropolygonOptions(edges="half", **options)
+
+
+@pytest.mark.parametrize("precision", ["half", "fixed"])
+def test_a_sample_on_an_edge_is_covered(precision):
+    """Edges along columns and rows of samples: those between two quads are covered twice, as with 32 bits."""
+    vertices = some_grids(1)
+    rows, columns = np.divmod(np.arange(16), 4)
+    vertices[0, :, :2] = np.stack([columns, rows], axis=1) * 2 + 4.5
+    overdraw = drawn(vertices, edges=precision, bound=8)[2]
+    assert np.array_equal(overdraw, drawn(vertices, bound=8)[2])
+    assert overdraw[4:11, 4:11].tolist() == np.outer(*[[1, 1, 2, 1, 2, 1, 1]] * 2).tolist()

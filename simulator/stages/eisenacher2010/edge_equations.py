@@ -58,7 +58,7 @@ def stored_edges(vertices: NDArray[np.float32], precision: Precision) -> StoredE
 def _whole(terms: NDArray[np.float64]) -> NDArray[np.float64]:
     """Whole numbers of 16 bits times a power of two, one of each grid."""
     largest = np.abs(terms).max(axis=(1, 2, 3), keepdims=True)
-    step = 2.0 ** (np.ceil(np.log2(np.maximum(largest, 2.0**-40))) - BITS)
+    step = 2.0 ** (np.floor(np.log2(np.maximum(largest, 2.0**-40))) + 1 - BITS)
     limit = 2**BITS - 1
     rounded: NDArray[np.float64] = np.clip(np.round(terms / step), -limit, limit) * step
     return rounded
