@@ -1,8 +1,8 @@
 """The history of the benchmarks: ``python -m tests.benchmarks.history [pytest's arguments]`` adds a run and plots all.
 
-A run is a line for each benchmark in ``history.csv`` (which git ignores; ``history.png`` shows it): the day, the commit,
-the median in milliseconds, its ratio to the yardstick's of the same run, and what else the benchmark noted, such as the
-peak of memory. Computers are noisy and unlike: compare ratios.
+A run is a line for each benchmark in ``history.csv`` (which git ignores; ``history.png`` shows it): the day, the
+commit, the median in milliseconds, its ratio to the yardstick's of the same run, and what else the benchmark noted,
+such as the peak of memory. Computers are noisy and unlike: compare ratios.
 """
 
 import json
