@@ -86,7 +86,7 @@ def simulate(
     scene = load_scene(scene)
     check_scene(pipeline, chosen, scene)
     seen_by = read_camera(camera, scene)
-    own = getattr(seen_by, "size", None)
+    own = getattr(seen_by, "screen", None)
     if own and width is None and height is None:
         drawing = msgspec.structs.replace(drawing, width=own[0], height=own[1])
     width, height = drawing.width, drawing.height

@@ -15,7 +15,14 @@ from tilestamp.simulator.pipelines import pipeline_names, pipeline_options
 
 PACKAGE = Path(tilestamp.__file__).parent
 SMALL = {"width": 48, "height": 36, "fidelity": "bounds"}
-MACHINES = {"interval": "h200", "interleaved": "h200", "tiled": "gt750m", "per-primitive": "gt750m", "binned": "ga104"}
+MACHINES = {
+    "splat": "h200",
+    "interval": "h200",
+    "interleaved": "h200",
+    "tiled": "gt750m",
+    "per-primitive": "gt750m",
+    "binned": "ga104",
+}
 EYE = np.eye(4)
 
 

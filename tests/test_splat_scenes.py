@@ -207,6 +207,10 @@ def test_a_picture_has_the_size_of_its_camera_where_none_is_given():
     assert (simulate("playbot", "splat", "h200", fidelity="counts", camera=fields).image == default).all()
 
 
+def test_a_picture_is_of_the_usual_size_where_its_view_has_none():
+    assert simulate("playbot", "splat", "h200", fidelity="counts", counting=False).image.shape == (768, 1024, 3)
+
+
 def test_splats_have_a_length():
     zeros = np.zeros((2, 4), np.float32)
     assert len(Splats(zeros[:, :3], zeros[:, :3], zeros, zeros[:, 0], zeros[:, :3])) == 2

@@ -35,7 +35,7 @@ from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected, project
 from tilestamp.simulator.stages.kerbl2023.ranges import ranges
 from tilestamp.simulator.stages.kerbl2023.scan import scan
-from tilestamp.simulator.stages.kerbl2023.sort import sort
+from tilestamp.simulator.stages.kerbl2023.sort import pass_work, sort
 from tilestamp.simulator.stages.kerbl2023.tight_count import tight_count
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles, tiles_of
 from tilestamp.simulator.work import Work
@@ -90,9 +90,9 @@ class SplatOptions(Options, frozen=True, kw_only=True):
         return self.sides[0] * self.sides[1]
 
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
-        """The blending loop has a thread for each pixel of a tile, or fewer."""
-        tiles = tiles_of(*self.sides, *self.sides)
-        return [blend_work(np.zeros((0, len(_E)), np.int64), tiles, self.threads or self.pixels)]
+        """A pass of the sort; the blending loop has a thread for each pixel of a tile, or fewer."""
+        tiles, none = tiles_of(*self.sides, *self.sides), np.zeros((0, len(_E)), np.int64)
+        return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels)]
 
 
 def splat(

@@ -47,10 +47,10 @@ class Pinhole:
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
-    """A camera that is given as the rasterizer takes it; ``size`` is the screen that it was made for."""
+    """A camera that is given as the rasterizer takes it; ``screen`` is that which it was made for."""
 
     pinhole: Pinhole
-    size: tuple[int, int] | None = None
+    screen: tuple[int, int] | None = None
 
     @classmethod
     def from_mapping(cls, fields: Mapping[str, Any]) -> "PinholeCamera":

@@ -170,6 +170,12 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
     count, key_bytes = len(pairs.keys), pairs.keys.itemsize
     _count_runs(counts, starts, count, key_bytes, simt.warp, table)
     table[0, _E.DIGITS_USED] = np.count_nonzero(counts.any(axis=0))
+    streams = _streams(count, key_bytes, int(table[:, _E.STORE_BYTES].sum()), back=k % 2 == 1)
+    return pass_work(table, streams, f"pass {k}")
+
+
+def pass_work(table: NDArray[np.int64], streams: tuple[Stream, ...] = (), variant: str = "") -> Work:
+    """Work of one pass, from the rows of its blocks."""
     return Work(
         stage="sort",
         kernel="sort_onesweep",
@@ -178,8 +184,8 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
         grid=len(table),
         block=BLOCK,
         shared_bytes=SHARED_BYTES,
-        streams=_streams(count, key_bytes, int(table[:, _E.STORE_BYTES].sum()), back=k % 2 == 1),
-        variant=f"pass {k}",
+        streams=streams,
+        variant=variant,
     )
 
 
