@@ -7,7 +7,7 @@ blocks behind them have to be started one by one. A unit takes its place until f
 *Its own time.* What it takes alone (``Demand.alone``), and what its neighbours on the SM add: both want a scheduler, or
 the SM, at the same time for at most the smaller of its own work there and theirs, and of two that want the same each
 goes first as often as the other. So half of the smaller is waited for. Neighbours' work is that of all units, less the
-longest one of each SM, a share an SM.
+longest one of each SM, a share an SM. Loops take turns (``models.turns``).
 
 *Its SM.* Schedulers, execution units, shared memory and load path (the fullest) serve units in order, as many at a time
 as there are SMs. A block's first request comes a block start after it got its place.
