@@ -99,7 +99,7 @@ def test_nan_positions_give_no_nan():
     ("pos", "tri", "resolution", "sentence"),
     [
         (TRIANGLE[0], TRI, (8, 8), "needs ranges"),
-        (TRIANGLE[..., :3], TRI, (8, 8), r"not float32 \[1, 3, 3\]"),
+        (TRIANGLE[..., :3].copy(), TRI, (8, 8), r"not float32 \[1, 3, 3\]"),
         (TRIANGLE.astype(float), TRI, (8, 8), "float64"),
         ([[1, 2]], TRI, (8, 8), "not list"),
         (TRIANGLE, TRI.astype(np.int64), (8, 8), "tri must be int32"),
@@ -134,7 +134,7 @@ def test_a_range_draws_its_triangles_by_their_numbers():
     [
         (RANGES.astype(np.int64), "ranges must be int32"),
         (RANGES[0], r"ranges must be int32 \[B, 2\]"),
-        (RANGES[:, :1], r"not int32 \[5, 1\]"),
+        (RANGES[:, :1].copy(), r"not int32 \[5, 1\]"),
     ],
 )
 def test_other_ranges_are_refused(ranges, sentence):

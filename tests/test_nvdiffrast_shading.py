@@ -168,12 +168,12 @@ def test_a_cube_map_is_continuous_across_edges_and_corners():
 
 def cube_corner(**options):
     """The lookup at a corner of the second cube map of a batch."""
-    d = np.broadcast_to(np.array([1, 1, 1.0001], np.float32), (2, 1, 1, 3))
+    d = np.array([[[[1, 1, 1.0001]]]] * 2, np.float32)
     return texture(CUBE, d, boundary_mode="cube", **options)[1, 0, 0]
 
 
 def test_a_mended_corner_of_the_second_cube_map_is_that_of_the_map_alone():
-    d = np.broadcast_to(np.array([1, 1, 1.0001], np.float32), (1, 1, 1, 3))
+    d = np.array([[[[1, 1, 1.0001]]]], np.float32)
     assert np.array_equal(cube_corner(faults="mended"), texture(CUBE[1:], d, boundary_mode="cube")[0, 0, 0])
 
 
@@ -191,9 +191,9 @@ def test_a_direction_of_no_length_shows_nothing():
         ((TEX, UV), {"filter_mode": "cubic"}, "not 'cubic'"),
         ((TEX, UV), {"boundary_mode": "mirror"}, "not 'mirror'"),
         ((TEX, UV), {"filter_mode": "linear-mipmap-linear"}, "needs uv_da"),
-        ((TEX[:, :3], UV), {"mip_level_bias": np.zeros((2, 6, 7), np.float32)}, "has no half"),
+        ((TEX[:, :3].copy(), UV), {"mip_level_bias": np.zeros((2, 6, 7), np.float32)}, "has no half"),
         ((TEX[:, :3].copy(), UV[:1]), {}, "batches of 2 and 1"),
-        ((CUBE[:, :, :2], np.ones((2, 1, 1, 3), np.float32)), {"boundary_mode": "cube"}, r"\[B, 6, H, H, C\]"),
+        ((CUBE[:, :, :2].copy(), np.ones((2, 1, 1, 3), np.float32)), {"boundary_mode": "cube"}, r"\[B, 6, H, H, C\]"),
         ((TEX, UV), {"boundary_mode": "cube"}, r"\[B, 6, H, H, C\]"),
     ],
 )

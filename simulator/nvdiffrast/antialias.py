@@ -29,8 +29,8 @@ def _cross(a: Any, b: Any, c: Any, d: Any) -> Any:
 
 @kernel(error_model="numpy", lent=True)
 def _same_sign(a: Any, b: Any) -> Any:
-    """Whether two numbers have the same sign bit."""
-    return np.signbit(a) == np.signbit(b)
+    """Whether two numbers have the same sign bit; NaN has none, as on the GPU."""
+    return (np.signbit(a) and not np.isnan(a)) == (np.signbit(b) and not np.isnan(b))
 
 
 @kernel(error_model="numpy", lent=True)

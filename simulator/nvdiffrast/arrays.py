@@ -25,11 +25,13 @@ class HasDLPack(Protocol):
 Array = NDArray[Any] | HasArray | HasDLPack
 
 Faults = Literal["kept", "mended"]
-"""Whether a fault of the original is reproduced (the default everywhere) or set right."""
+"""Whether a fault of the original is reproduced or set right."""
+
+MOST_TRIANGLES = 2**24  # whose numbers float32 holds
 
 
 def as_array(name: str, value: object, dtype: type[np.generic], shape: str, *dimensions: int) -> NDArray[Any]:
-    """Take an argument without a copy where its memory allows.
+    """Take an argument, without a copy where it may be written to (kernels are not compiled twice).
 
     Parameters
     ----------
@@ -47,26 +49,35 @@ def as_array(name: str, value: object, dtype: type[np.generic], shape: str, *dim
     Returns
     -------
     ndarray
-        C-contiguous. (The original refuses arrays that are not.)
+        C-contiguous, aligned, writable.
 
     Raises
     ------
     TilestampError
-        Another type, another number of axes, or no element.
+        Another type, another number of axes, no element, not contiguous, or not on the CPU.
     """
-    if isinstance(value, np.ndarray):
-        array = value
-    elif hasattr(value, "__array__"):
-        array = np.asarray(value.detach() if hasattr(value, "detach") else value)
-    elif hasattr(value, "__dlpack__"):
-        array = np.from_dlpack(value)
-    else:
+    array = _memory_of(name, value)
+    if array is None:
         raise TilestampError(f"{name} must be {np.dtype(dtype)} {shape}, not {type(value).__name__}")
     if array.dtype != dtype or array.ndim not in dimensions:
         raise TilestampError(f"{name} must be {np.dtype(dtype)} {shape}, not {array.dtype} {list(array.shape)}")
     if array.size == 0:
         raise TilestampError(f"{name} {list(array.shape)} must not be empty")
-    return np.ascontiguousarray(array)
+    if not array.flags.c_contiguous:
+        raise TilestampError(f"{name} must be contiguous, as for the original: pass np.ascontiguousarray({name})")
+    return np.require(array, requirements=["C", "A", "W"])
+
+
+def _memory_of(name: str, value: Any) -> NDArray[Any] | None:
+    """The array of an object, None if it has none."""
+    if isinstance(value, np.ndarray):
+        return np.asarray(value)
+    try:
+        if hasattr(value, "__array__"):
+            return np.asarray(value.detach() if hasattr(value, "detach") else value)
+        return np.from_dlpack(value) if hasattr(value, "__dlpack__") else None
+    except (TypeError, RuntimeError, BufferError, ValueError) as error:
+        raise TilestampError(f"{name} cannot be read as an array on the CPU: {error}") from error
 
 
 def need_axis(name: str, array: NDArray[Any], axis: int, length: int, shape: str) -> None:
@@ -79,6 +90,8 @@ def as_triangles(tri: object) -> NDArray[np.int32]:
     """Take vertex indices, int32 [F, 3]; they may be out of range."""
     array = as_array("tri", tri, np.int32, "[F, 3]", 2)
     need_axis("tri", array, 1, 3, "[F, 3]")
+    if len(array) > MOST_TRIANGLES:
+        raise TilestampError(f"tri has {len(array)} triangles; float32 has numbers for {MOST_TRIANGLES}")
     return array
 
 
@@ -91,6 +104,13 @@ def as_resolution(resolution: Iterable[int]) -> tuple[int, int]:
     if height < 1 or width < 1:
         raise TilestampError(f"resolution {height}x{width}: both must be at least 1")
     return height, width
+
+
+def are_mended(faults: str) -> bool:
+    """Whether faults are to be mended; other words than the two are refused."""
+    if faults not in {"kept", "mended"}:
+        raise TilestampError(f"faults must be 'kept' or 'mended', not {faults!r}")
+    return faults == "mended"
 
 
 def same_batch(first: int, second: int, names: str) -> None:

@@ -5,7 +5,7 @@ from types import TracebackType
 from typing import Self
 
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.nvdiffrast.arrays import Array, Faults
+from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, are_mended
 from tilestamp.simulator.nvdiffrast.draw import Clip
 from tilestamp.simulator.nvdiffrast.rasterize import PEELERS, Batch, Depths, Raster
 
@@ -40,9 +40,8 @@ class DepthPeeler:
         clip: Clip = "2025",
         faults: Faults = "mended",
     ) -> None:
-        self._batch: Batch | None = Batch(pos, tri, resolution, ranges, clip)
-        self.grad_db = grad_db
-        self._shared = faults == "kept"
+        self._batch: Batch | None = Batch(pos, tri, resolution, ranges, grad_db, clip)
+        self._shared = not are_mended(faults)
         self._inside = False
         self._depths: Depths | None = None
 

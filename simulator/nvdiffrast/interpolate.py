@@ -120,7 +120,7 @@ def interpolate(
     count = images.shape[2]
     diff = _listed(diff_attrs, count)
     steps = rast  # not read without diff_attrs
-    if diff_attrs is not None:
+    if len(diff):
         steps = as_array("rast_db (needed by diff_attrs)", rast_db, np.float32, "[B, H, W, 4]", 4)
         if steps.shape != rast.shape:
             raise TilestampError(f"rast_db {list(steps.shape)} must be as large as rast {list(rast.shape)}")
@@ -141,8 +141,11 @@ def _listed(diff_attrs: Sequence[int] | Literal["all"] | None, count: int) -> ND
         if diff_attrs != "all":
             raise TilestampError(f"diff_attrs must be a list of attributes or 'all', not {diff_attrs!r}")
         return np.arange(count)
-    if len(diff_attrs) > MAX_LISTED:
-        raise TilestampError(f"diff_attrs has {len(diff_attrs)} entries, more than the {MAX_LISTED} of the original")
-    listed = np.array([int(a) for a in diff_attrs], np.int64)
+    try:
+        listed = np.array([int(a) for a in diff_attrs], np.int64)
+    except (TypeError, ValueError, OverflowError):
+        raise TilestampError(f"diff_attrs must be a list of attributes or 'all', not {diff_attrs!r}") from None
+    if len(listed) > MAX_LISTED:
+        raise TilestampError(f"diff_attrs has {len(listed)} entries, more than the {MAX_LISTED} of the original")
     listed[listed < 0] += count
     return np.where((listed >= 0) & (listed < count), listed, -1)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.nvdiffrast.arrays import Array, as_array
-from tilestamp.simulator.nvdiffrast.texels import cube_axes
+from tilestamp.simulator.nvdiffrast.texels import FACES, cube_axes
 from tilestamp.simulator.stages.laine2011.exact import fma
 
 _QUARTER, _HALF, _ONE, _NONE = np.float32(0.25), np.float32(0.5), np.float32(1), np.float32(0)
@@ -42,20 +42,36 @@ def half_size(level: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def smaller_levels(tex: NDArray[np.float32], most: int | None) -> list[NDArray[np.float32]]:
     """Levels 1 and on, down to 1x1 or at most ``most`` of them."""
+    need_levels(most)
     levels = [tex]
     while max(levels[-1].shape[-3:-1]) > 1 and (most is None or len(levels) <= most):
         levels.append(half_size(levels[-1]))
     return levels[1:]
 
 
+def need_levels(most: int | None) -> None:
+    """Refuse a negative number of levels."""
+    if most is not None and most < 0:
+        raise TilestampError(f"max_mip_level must be at least 0, not {most}")
+
+
+def as_texture(tex: Array, *, cube: bool) -> NDArray[np.float32]:
+    """Take a batch of textures or of cube maps."""
+    shape = "[B, 6, H, H, C]" if cube else "[B, H, W, C]"
+    tex = as_array("tex", tex, np.float32, shape, 5 if cube else 4)
+    if cube and (tex.shape[1] != FACES or tex.shape[2] != tex.shape[3]):
+        raise TilestampError(f"tex must be float32 {shape}, not {list(tex.shape)}")
+    return tex
+
+
 def texture_construct_mip(
-    tex: Array, max_mip_level: int | None = None, *, cube_mode: bool = False
-) -> list[NDArray[Any]]:
+    tex: Array, max_mip_level: int | None = None, cube_mode: bool = False
+) -> list[NDArray[np.float32]]:
     """Build the smaller levels of a texture once, for several calls of ``texture``.
 
     Parameters
     ----------
-    tex : array, (B, H, W, C) or with ``cube_mode`` (B, 6, H, W, C), float32
+    tex : array, (B, H, W, C) or with ``cube_mode`` (B, 6, H, H, C), float32
     max_mip_level : int, optional
         Levels to make; without it down to one texel.
     cube_mode : bool
@@ -68,10 +84,9 @@ def texture_construct_mip(
     Raises
     ------
     TilestampError
-        Where a level has an odd size larger than 1.
+        For other shapes and types, and where a level has an odd size larger than 1.
     """
-    shape = "[B, 6, H, W, C]" if cube_mode else "[B, H, W, C]"
-    return smaller_levels(as_array("tex", tex, np.float32, shape, 5 if cube_mode else 4), max_mip_level)
+    return smaller_levels(as_texture(tex, cube=cube_mode), max_mip_level)
 
 
 def as_mipmap(levels: Sequence[NDArray[np.float32]]) -> Mipmap:

@@ -11,7 +11,15 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, as_array, as_resolution, as_triangles, need_axis
+from tilestamp.simulator.nvdiffrast.arrays import (
+    Array,
+    Faults,
+    are_mended,
+    as_array,
+    as_resolution,
+    as_triangles,
+    need_axis,
+)
 from tilestamp.simulator.nvdiffrast.cost import priced
 from tilestamp.simulator.nvdiffrast.draw import UNCOUNTED, Clip, draw
 from tilestamp.simulator.run import Run
@@ -29,13 +37,15 @@ class Batch:
 
     Parameters
     ----------
-    pos, tri, resolution, ranges, clip
+    pos, tri, resolution, ranges, grad_db, clip
         As ``rasterize`` takes them.
     """
 
     def __init__(
-        self, pos: Array, tri: Array, resolution: Iterable[int], ranges: Array | None = None, clip: Clip = "2025"
+        self, pos: Array, tri: Array, resolution: Iterable[int], ranges: Array | None, grad_db: bool, clip: Clip
     ) -> None:
+        if not isinstance(grad_db, bool):
+            raise TilestampError(f"grad_db must be a bool, not {grad_db!r}")
         self.pos = as_array("pos", pos, np.float32, "[B, V, 4] (or [V, 4] with ranges)", 2, 3)
         need_axis("pos", self.pos, -1, 4, "[B, V, 4] (or [V, 4] with ranges)")
         self.tri = as_triangles(tri)
@@ -147,20 +157,19 @@ def rasterize(
     rast_db : ndarray, (B, H, W, 4), float32
         du/dX, du/dY, dv/dX, dv/dY, in units of pixels.
     run : Run
-        With ``cost``: what the call would take there, by stage (``run.stages``), and why (``run.why()``). The images
-        of a batch are priced one after another; the original draws them side by side, in less time.
+        With ``cost``: what the call would take there, by stage (``run.stages``, whose ``bound`` says why), and what
+        moves it (``run.sensitivity()``). The images of a batch are priced one after another; the original draws them
+        side by side, in less time.
 
     Raises
     ------
     TilestampError
         For other shapes, types or sizes.
     """
-    if not isinstance(grad_db, bool):
-        raise TilestampError(f"grad_db must be a bool, not {grad_db!r}")
     if PEELERS:  # the original returns it, and so does this where a peeler was made to keep its faults
         return RuntimeError("depth peeling is at work: call rasterize_next_layer")  # type: ignore[return-value]
-    batch = Batch(pos, tri, resolution, ranges, clip)
-    if faults == "mended" and ranges is not None and batch.pos.ndim == 3:
+    batch = Batch(pos, tri, resolution, ranges, grad_db, clip)
+    if are_mended(faults) and ranges is not None and batch.pos.ndim == 3:
         raise TilestampError("ranges go with pos [V, 4]; pos [B, V, 4] draws all triangles in each image")
     if cost is None:
         return batch.layer()[0]

@@ -8,6 +8,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.exact import fma
 
 WRAP, CLAMP, ZERO, CUBE = range(4)
+FACES = 6
 NO_TEXEL = -1
 _HALF, _ONE, _NONE = np.float32(0.5), np.float32(1), np.float32(0)
 _LARGEST, _LEAST = 2147483647.0, -2147483648.0
@@ -33,7 +34,7 @@ def _reciprocal_toward_zero(value: Any) -> Any:
     """1 / value as a float32 that is not larger, of a positive value."""
     exact = 1.0 / np.float64(value)
     rounded = np.float32(exact)
-    return np.nextafter(rounded, _NONE) if np.float64(rounded) > exact and rounded < np.inf else rounded
+    return np.nextafter(rounded, _NONE) if np.float64(rounded) > exact else rounded
 
 
 @kernel(error_model="numpy", lent=True)

@@ -8,17 +8,20 @@ from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, as_array, need_axis, same_batch
+from tilestamp.simulator.nvdiffrast.arrays import Array, Faults, are_mended, as_array, need_axis, same_batch
 from tilestamp.simulator.nvdiffrast.mipmap import (
     Mipmap,
     as_mipmap,
+    as_texture,
     clamped_level,
     cube_steps,
     level_of,
+    need_levels,
     smaller_levels,
 )
 from tilestamp.simulator.nvdiffrast.texels import (
     CUBE,
+    FACES,
     cube_place,
     cube_texels,
     floor_to_int32,
@@ -32,7 +35,6 @@ Filter = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-m
 Boundary = Literal["wrap", "clamp", "zero", "cube"]
 FILTERS = ("nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear")
 BOUNDARIES = ("wrap", "clamp", "zero", "cube")
-FACES = 6
 NEAREST, LINEAR, MIP_NEAREST, MIP_LINEAR = range(4)
 _THIRD = np.float32(0.33333333)
 _NONE = np.float32(0)
@@ -183,6 +185,7 @@ def texture(
     TilestampError
         For other shapes, types and modes.
     """
+    mended = are_mended(faults)
     if filter_mode == "auto":
         filter_mode = "linear" if uv_da is None and mip_level_bias is None else "linear-mipmap-linear"
     mode, boundary = _index("filter_mode", filter_mode, FILTERS), _index("boundary_mode", boundary_mode, BOUNDARIES)
@@ -203,7 +206,7 @@ def texture(
             steps, bias = None if uv_da is None else uv_da[b], None if mip_level_bias is None else mip_level_bias[b]
             for_parts(
                 _rows_part, parts_of(uv.shape[1], 4), packed, b % len(tex), uv[b], steps, bias, mode, boundary,
-                faults == "mended", out[b],
+                mended, out[b],
             )  # fmt: skip
     return out
 
@@ -215,10 +218,7 @@ def _index(name: str, value: str, known: tuple[str, ...]) -> int:
 
 
 def _check(tex: Array, uv: Array, *, cube: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    shape = "[B, 6, H, H, C]" if cube else "[B, H, W, C]"
-    tex = as_array("tex", tex, np.float32, shape, 5 if cube else 4)
-    if cube and (tex.shape[1] != FACES or tex.shape[2] != tex.shape[3]):
-        raise TilestampError(f"tex must be float32 {shape}, not {list(tex.shape)}")
+    tex = as_texture(tex, cube=cube)
     uv_shape = "[B, H, W, 3]" if cube else "[B, H, W, 2]"
     uv = as_array("uv", uv, np.float32, uv_shape, 4)
     need_axis("uv", uv, 3, 3 if cube else 2, uv_shape)
@@ -240,6 +240,7 @@ def _per_pixel(name: str, value: Array | None, shape: tuple[int, ...], component
 
 def _given_levels(tex: NDArray[np.float32], mip: Sequence[Array], most: int | None) -> list[NDArray[np.float32]]:
     """Levels that the caller made: each half as large as the one before, down to 1."""
+    need_levels(most)
     levels, height, width = [], *tex.shape[-3:-1]
     for i, level in enumerate(mip if most is None else mip[:most], 1):
         height, width = max(height // 2, 1), max(width // 2, 1)
