@@ -57,7 +57,10 @@ class Scene:
         colours : array-like, (N, 3)
             Red, green, blue, the same from all sides.
 
-        Raises TilestampError where they do not fit together, are no numbers, or are none.
+        Raises
+        ------
+        TilestampError
+            They do not fit together, are no numbers, or are none.
         """
         return cls(name, splats=make_splats(means, scales, rotations, opacities, colours))
 
