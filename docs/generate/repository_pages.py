@@ -28,8 +28,7 @@ def pages() -> dict[str, str | bytes]:
         "quick-start.md": _linked("# Quick start\n\n" + "".join(f"## {part}" for part in rest)),
         "contributing.md": _linked((ROOT / "CONTRIBUTING.md").read_text("utf-8")),
         "changelog.md": _linked((ROOT / "CHANGELOG.md").read_text("utf-8")),
-        "gallery.md": (GALLERY / "README.md").read_text("utf-8").replace("../../docs/", "").replace("](", "](gallery/")
-        .replace("](gallery/accuracy.md", "](accuracy.md"),
+        "gallery.md": _gallery((GALLERY / "README.md").read_text("utf-8")),
     }  # fmt: skip
     return made | {f"gallery/{path.name}": path.read_bytes() for path in sorted(GALLERY.glob("*.png"))}
 
@@ -37,3 +36,8 @@ def pages() -> dict[str, str | bytes]:
 def _linked(text: str) -> str:
     """Links into docs/ and to the gallery, as the site has them."""
     return text.replace("](docs/", "](").replace("](reports/gallery/", "](gallery/")
+
+
+def _gallery(text: str) -> str:
+    """The gallery's pictures and its links into docs/, as the site has them."""
+    return re.sub(r"\]\((?!\.\./)", "](gallery/", text).replace("](../../docs/", "](")

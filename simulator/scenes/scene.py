@@ -53,9 +53,14 @@ class Scene:
         rotations : array-like, (N, 4)
             Quaternions w x y z, which are not normalized.
         opacities : array-like, (N,)
+            0 to 1.
         colours : array-like, (N, 3)
+            Red, green, blue, the same from all sides.
 
-        Raises TilestampError where they do not fit together, are no numbers, or are none.
+        Raises
+        ------
+        TilestampError
+            They do not fit together, are no numbers, or are none.
         """
         return cls(name, splats=make_splats(means, scales, rotations, opacities, colours))
 
