@@ -272,6 +272,13 @@ def test_gaussians_of_no_numbers_fill_their_pairs_or_have_none(bound):
     assert sorted(np.repeat(np.arange(64), buffers["tiles"])) == sorted(i for ours in lists.values() for i in ours)
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("away", [3e6, 1e8])
+def test_a_gaussian_far_beside_the_screen_that_covers_it_is_seen_by_all_pixels(side, away):
+    made = Scene.from_splats([(side * away, 0.0, 2.0)], [(away, away, 1.0)], [(1, 0, 0, 0)], [0.9], np.ones((1, 3)))
+    assert draw(made).frame.buffers["reached"].all()
+
+
 def test_a_radius_without_bound_is_the_largest_integer():
     assert to_int(np.float32(np.inf)) == 2**31 - 1
     assert to_int(np.float32(-np.inf)) == -(2**31)
