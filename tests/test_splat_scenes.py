@@ -221,16 +221,24 @@ def camera_fields(size=(96, 72)):
 def test_a_camera_of_a_file_is_taken_to_the_bit(tmp_path):
     fields = camera_fields()
     (tmp_path / "cameras.json").write_text(json.dumps({"one": fields}))
-    for source in (fields, f"{tmp_path / 'cameras.json'}:one"):
+    (tmp_path / "scene.json").write_text(json.dumps({"count": 5, "cameras": {"one": fields}}))
+    for source in (fields, f"{tmp_path / 'cameras.json'}:one", f"{tmp_path / 'scene.json'}:one"):
         camera = pinhole_camera(read_camera(source), 10, 10)
         assert camera.view.ravel().tolist() == fields["view_row_major"]
         assert camera.proj_view.ravel().tolist() == fields["proj_view_row_major"]
         assert camera.tan_x == np.float32(0.7)
 
 
+def test_a_view_without_volume_has_no_eye():
+    fields = camera_fields() | {"view_row_major": [0.0] * 16}
+    with pytest.raises(TilestampError, match="the axes of its view lie in a plane"):
+        _ = pinhole_camera(read_camera(fields), 10, 10).eye
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
+        ({"W": "wide"}, "W and H must be whole numbers"),
         ({"tan_fovx": 0.0}, "tan_fovx and tan_fovy must be over 0"),
         ({"view_row_major": [1.0] * 15}, "view_row_major needs 16 finite numbers"),
         ({"proj_view_row_major": ["a"] * 16}, "proj_view_row_major is not made of numbers"),
