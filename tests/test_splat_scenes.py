@@ -16,6 +16,7 @@ from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 
 NAMES = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
 REST = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
+PACKED = ("position", "rotation", "scale", "color")
 CONSTANT = 0.28209479177387814
 
 
@@ -76,6 +77,38 @@ def test_a_mesh_stays_a_mesh(tmp_path):
     scene = load_scene(tmp_path / "mesh.ply")
     assert scene.splats is None
     assert len(scene.mesh.triangles) == 1
+
+
+def test_a_mesh_whose_comment_names_a_colour_of_splats_stays_a_mesh(tmp_path):
+    (tmp_path / "mesh.ply").write_text(
+        "ply\nformat ascii 1.0\ncomment made from f_dc_0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    assert load_scene(tmp_path / "mesh.ply").splats is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (b"element vertex 7", b"element vertex 0", "splats: there are none"),
+        (b"element vertex", b"element point", "a splat file without vertex"),
+    ],
+)
+def test_a_file_without_gaussians_says_so(tmp_path, old, new, sentence):
+    published_ply(tmp_path / "trained.ply", 1)
+    (tmp_path / "broken.ply").write_bytes((tmp_path / "trained.ply").read_bytes().replace(old, new))
+    with pytest.raises(TilestampError, match=sentence):
+        load_scene(tmp_path / "broken.ply")
+
+
+def test_a_compressed_file_with_too_few_chunks_says_so(tmp_path):
+    bounds = [f"{end}_{axis}" for axis in ("x", "y", "z", "scale_x", "scale_y", "scale_z") for end in ("min", "max")]
+    header = ["ply", "format binary_little_endian 1.0", "element chunk 1", *(f"property float {one}" for one in bounds)]
+    header += ["element vertex 257", *(f"property uint packed_{one}" for one in PACKED), "end_header", ""]
+    (tmp_path / "c.compressed.ply").write_bytes("\n".join(header).encode() + bytes(4 * len(bounds) + 16 * 257))
+    with pytest.raises(TilestampError, match="1 chunks has fewer than its 257 Gaussians need"):
+        load_scene(tmp_path / "c.compressed.ply")
 
 
 def test_a_file_that_lacks_a_property_says_which(tmp_path):
@@ -149,6 +182,15 @@ def test_a_sog_scene_is_a_folder_its_meta_json_or_a_zip(tmp_path):
         assert (found.opacities == 1).all()
 
 
+@pytest.mark.parametrize("meta", [[1], None, {"count": -1}, {"count": float("inf")}])
+def test_a_sog_scene_of_a_broken_meta_json_says_so(tmp_path, meta):
+    folder = sog_folder(tmp_path / "little")
+    whole = json.loads((folder / "meta.json").read_text())
+    (folder / "meta.json").write_text(json.dumps(whole | meta if isinstance(meta, dict) else meta))
+    with pytest.raises(TilestampError, match="is no whole SOG scene"):
+        load_scene(folder)
+
+
 def test_a_sog_scene_without_a_file_says_so(tmp_path):
     folder = sog_folder(tmp_path / "little")
     (folder / "quats.webp").unlink()
@@ -179,16 +221,24 @@ def camera_fields(size=(96, 72)):
 def test_a_camera_of_a_file_is_taken_to_the_bit(tmp_path):
     fields = camera_fields()
     (tmp_path / "cameras.json").write_text(json.dumps({"one": fields}))
-    for source in (fields, f"{tmp_path / 'cameras.json'}:one"):
+    (tmp_path / "scene.json").write_text(json.dumps({"count": 5, "cameras": {"one": fields}}))
+    for source in (fields, f"{tmp_path / 'cameras.json'}:one", f"{tmp_path / 'scene.json'}:one"):
         camera = pinhole_camera(read_camera(source), 10, 10)
         assert camera.view.ravel().tolist() == fields["view_row_major"]
         assert camera.proj_view.ravel().tolist() == fields["proj_view_row_major"]
         assert camera.tan_x == np.float32(0.7)
 
 
+def test_a_view_without_volume_has_no_eye():
+    fields = camera_fields() | {"view_row_major": [0.0] * 16}
+    with pytest.raises(TilestampError, match="the axes of its view lie in a plane"):
+        _ = pinhole_camera(read_camera(fields), 10, 10).eye
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
+        ({"W": "wide"}, "W and H must be whole numbers"),
         ({"tan_fovx": 0.0}, "tan_fovx and tan_fovy must be over 0"),
         ({"view_row_major": [1.0] * 15}, "view_row_major needs 16 finite numbers"),
         ({"proj_view_row_major": ["a"] * 16}, "proj_view_row_major is not made of numbers"),

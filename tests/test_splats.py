@@ -17,6 +17,7 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import blend_step
 from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, keys_of
 from tilestamp.simulator.stages.kerbl2023.exponential import exp32
 from tilestamp.simulator.stages.kerbl2023.sort import sort
+from tilestamp.simulator.stages.kerbl2023.tiles import to_int
 
 WIDTH, HEIGHT = 75, 50
 FORWARD = perspective(np.eye(4), 1.0, HEIGHT / WIDTH)
@@ -249,6 +250,39 @@ def test_what_a_pipeline_cannot_draw_is_refused_in_a_sentence():
         simulate("teapot", "splat", "h200")
     with pytest.raises(TilestampError, match="threads: a tile of 8 has 64 pixels, fewer than 128"):
         draw(tile=8, threads=128)
+
+
+def nasty(count=64):
+    """Splats with numbers that are none, or beyond all others."""
+    made = odd_splats(count).splats
+    means, scales, turns = (array.copy() for array in (made.means, made.scales, made.rotations))
+    opacities = made.opacities.copy()
+    scales[20], scales[21, 1], scales[22], turns[23, 0], turns[24] = np.nan, np.nan, np.inf, np.nan, 1e20
+    scales[25], means[26], means[27, 0], scales[28], turns[29] = 1e12, 1e38, np.nan, 0.0, 0.0
+    opacities[30:36] = np.nan, np.inf, -1.0, 2.0, 0.0, 1e7
+    return Scene.from_splats(means, scales, turns, opacities, made.colours)
+
+
+@pytest.mark.parametrize("bound", ["square", "box", "ellipse"])
+def test_gaussians_of_no_numbers_fill_their_pairs_or_have_none(bound):
+    run = draw(nasty(), bound=bound, tile=8)
+    buffers, lists = run.frame.buffers, tile_lists(run)
+    assert not buffers["radii"][[20, 21, 23]].any()
+    assert not buffers["tiles"][buffers["radii"] == 0].any()
+    assert sorted(np.repeat(np.arange(64), buffers["tiles"])) == sorted(i for ours in lists.values() for i in ours)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("away", [3e6, 1e8])
+def test_a_gaussian_far_beside_the_screen_that_covers_it_is_seen_by_all_pixels(side, away):
+    made = Scene.from_splats([(side * away, 0.0, 2.0)], [(away, away, 1.0)], [(1, 0, 0, 0)], [0.9], np.ones((1, 3)))
+    assert draw(made).frame.buffers["reached"].all()
+
+
+def test_a_radius_without_bound_is_the_largest_integer():
+    assert to_int(np.float32(np.inf)) == 2**31 - 1
+    assert to_int(np.float32(-np.inf)) == -(2**31)
+    assert to_int(np.float32(np.nan)) == 0
 
 
 def test_any_camera_of_right_angles_sees_what_its_pinhole_sees():

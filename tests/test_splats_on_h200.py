@@ -105,6 +105,13 @@ def test_every_array_is_the_h200_s_to_the_bit(case):
     assert {name for name, array in arrays.items() if checksum(array) != wanted[name]} == set()
 
 
+def test_the_picture_is_rounded_as_the_measured_one(case):
+    with np.load(case.folder / "ids" / f"{case.scene}_{case.screen}_{case.tile}_{case.rule}.npz") as file:
+        if "picture_u8" not in file:
+            pytest.skip("no picture was kept of this one")
+        assert (case.run.image == file["picture_u8"].transpose(1, 2, 0)).all()
+
+
 def test_the_covariances_in_space_are_the_h200_s(case):
     space = np.zeros((len(case.splats), 6), np.float32)
     tiles = tiles_of(case.camera["W"], case.camera["H"], 16, 16)

@@ -132,7 +132,7 @@ def splat(
         execute(gradients, *inputs, atomics=options.gradients)
     lists = np.diff(starts)
     return Frame(
-        np.clip(np.rint(pixels.colours * 255), 0, 255).astype(np.uint8),
+        np.clip(pixels.colours * 255 + np.float32(0.5), 0, 255).astype(np.uint8),
         _depth(pixels, starts, pairs, projected, tiles),
         execute.works,
         maps=_maps(lists, works, pixels, tiles),

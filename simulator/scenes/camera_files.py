@@ -18,6 +18,7 @@ from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.text_scan import plain_text, read_bytes
 
 MATRIX_KEY = "model_to_clip"
+CAMERAS = "cameras"  # of a file that has more than those
 CameraSource = Camera | ArrayLike | Mapping[str, Any] | Path | None
 OPTIONAL_KEYS = ("fov_degrees", "near", "far")
 KEYS = ("eye", "target", "position", "forward", "up", *OPTIONAL_KEYS)
@@ -33,7 +34,8 @@ def read_camera(source: CameraSource = None, scene: Scene | Mapping[str, Camera]
         A 4x4 matrix is model to clip space, row-major. A mapping has the key ``model_to_clip``, or ``eye, target, up,
         fov_degrees, near, far``, or ``position, forward, up, fov_degrees, near, far``, or those of a pinhole camera,
         ``W, H, tan_fovx, tan_fovy, view_row_major, proj_view_row_major``. A string is a view's name or
-        ``FILE.json``, ``FILE.json:KEY`` or ``FILE.json:KEY:INDEX``. None is the view ``default``.
+        ``FILE.json``, ``FILE.json:KEY`` or ``FILE.json:KEY:INDEX``; KEY may be one of its
+        ``cameras``. None is the view ``default``.
     scene : Scene or mapping of str to Camera, optional
         Where views are looked up; a scene without a view ``default`` gets a fitted one.
 
@@ -90,6 +92,8 @@ def _member(document: object, key: str) -> Any:
     """Give the member of a dictionary or list that a part of ``FILE.json:KEY:INDEX`` names."""
     if isinstance(document, Mapping) and key in document:
         return document[key]
+    if isinstance(document, Mapping) and isinstance(document.get(CAMERAS), Mapping) and key in document[CAMERAS]:
+        return document[CAMERAS][key]
     if isinstance(document, list) and key.isdecimal() and int(key) < len(document):
         return document[int(key)]
     raise TilestampError(f"there is no {key!r} in it; {_what_there_is(document)}")

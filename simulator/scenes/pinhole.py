@@ -40,9 +40,12 @@ class Pinhole:
 
     @property
     def eye(self) -> NDArray[np.floating]:
-        """Where it stands, (3,)."""
+        """Where it stands, (3,); raises TilestampError where its axes lie in a plane."""
         view = self.view.astype(np.float64)
-        return -np.linalg.solve(view[:3, :3], view[:3, 3])
+        try:
+            return -np.linalg.solve(view[:3, :3], view[:3, 3])
+        except np.linalg.LinAlgError:
+            raise TilestampError("camera: the axes of its view lie in a plane, so that it has no eye") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,10 @@ class PinholeCamera:
         tan_x, tan_y = (_floats([fields[key]], 1, key)[0] for key in KEYS[:2])
         if not (tan_x > 0 and tan_y > 0):
             raise TilestampError(f"camera: tan_fovx and tan_fovy must be over 0, not {tan_x:g} and {tan_y:g}")
-        size = (int(fields["W"]), int(fields["H"])) if {"W", "H"} <= fields.keys() else None
+        try:
+            size = (int(fields["W"]), int(fields["H"])) if {"W", "H"} <= fields.keys() else None
+        except (TypeError, ValueError, OverflowError):
+            raise TilestampError("camera: W and H must be whole numbers") from None
         return cls(Pinhole(view, proj_view, tan_x, tan_y), size)
 
     def pinhole_for(self, width: int, height: int) -> Pinhole:  # noqa: ARG002 - as it was given

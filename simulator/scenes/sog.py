@@ -45,7 +45,7 @@ def _splats(path: Path, read: Callable[[str], bytes], notes: Notes) -> Splats:
             raise TilestampError(f"{path}: is SOG of version {meta.get('version', 1)}; only version {VERSION} is read")
         notes.add_if("shN" in meta, "colours that depend on the direction (shN) are not read")
         return _decoded(meta, lambda name: _channels(read(name), int(meta["count"])))
-    except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
         if isinstance(error, TilestampError):
             raise
         raise TilestampError(f"{path}: is no whole SOG scene ({error})") from None
@@ -57,6 +57,8 @@ def _channels(data: bytes, count: int) -> NDArray[np.uint8]:
 
     with Image.open(io.BytesIO(data)) as image:
         pixels = np.asarray(image.convert("RGBA")).reshape(-1, 4)[:count]
+    if count < 0:
+        raise ValueError(f"a count of {count}")
     if len(pixels) < count:
         raise ValueError(f"an image has fewer than {count} pixels")
     return pixels

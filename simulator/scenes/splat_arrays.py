@@ -17,7 +17,7 @@ def has_splat_arrays(path: Path) -> bool:
     """Whether a .npz file has splats."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            return {"means", "scales", "opacities"} <= set(arrays)
+            return {"means", "scales"} <= set(arrays)
     except (OSError, ValueError, BadZipFile):
         return False
 

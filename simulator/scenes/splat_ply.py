@@ -5,6 +5,7 @@ and 11 bits, rotation in 2 bits that name the largest part and 10 for each other
 opacity in 8 each.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from tilestamp.simulator.scenes.splats import HARMONICS, Splats, make_splats
 
 CONSTANT = 0.28209479177387814  # the spherical harmonic of degree 0
 HEADER_BYTES = 1 << 14  # in which the properties of a header stand
-MARKS = (b" f_dc_0", b" packed_position")  # by which a PLY file has splats
+MARK = re.compile(rb"[\r\n]\s*property\s+\w+\s+(f_dc_0|packed_position)\b")  # by which a PLY file has splats
 CHUNK = 256
 Floats = NDArray[np.float64]
 
@@ -29,15 +30,15 @@ def has_splats(path: Path) -> bool:
             start = file.read(HEADER_BYTES)
     except OSError:
         return False
-    return any(mark in start for mark in MARKS)
+    return MARK.search(start.partition(b"end_header")[0]) is not None
 
 
 def read_splat_ply(path: Path, notes: Notes) -> Splats:
     """Read splats of either form; raises TilestampError."""
     elements = read_elements(path, notes)
-    vertex = elements["vertex"]
     notes.add_if("sh" in elements, "colours that depend on the direction are not read from a compressed file")
     try:
+        vertex = elements["vertex"]
         if "packed_position" in vertex.values:
             return _compressed(vertex, elements["chunk"])
         return _published(vertex)
@@ -76,7 +77,7 @@ def _published(vertex: Element) -> Splats:
     harmonics = None
     if count:
         rest = np.stack([vertex.values[f"f_rest_{k}"] for k in range(count)], axis=1)
-        harmonics = rest.reshape(len(rest), 3, -1).transpose(0, 2, 1)
+        harmonics = rest.reshape(len(rest), 3, count // 3).transpose(0, 2, 1)
     return make_splats(
         _columns(vertex, "x", "y", "z"),
         np.exp(_columns(vertex, "scale_0", "scale_1", "scale_2")),
@@ -98,6 +99,8 @@ def _compressed(vertex: Element, chunk: Element) -> Splats:
     names = ("position", "rotation", "scale", "color")
     words = {name: vertex.values[f"packed_{name}"].astype(np.uint32) for name in names}
     of = np.arange(len(words["position"])) // CHUNK
+    if len(of) and of[-1] >= chunk.rows:
+        raise TilestampError(f"a splat file with {chunk.rows} chunks has fewer than its {len(of)} Gaussians need")
 
     def between(shares: Floats, *axes: str) -> Floats:
         low, high = (_columns(chunk, *(f"{end}_{axis}" for axis in axes))[of] for end in ("min", "max"))

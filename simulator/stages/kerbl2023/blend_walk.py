@@ -18,7 +18,7 @@ WIDE, HIGH, LEAST_POWER, REACH = range(4)  # of a Gaussian: half its box, and th
 EVALUATIONS, BLENDED, SKIPPED_POWER, STOPPED, BOUNDED_STEPS, BLEND_STEPS, TRIPS, TOTALS = range(8)
 # Of a group in a round:
 ROUND_BLENDS, ROUND_RUNS, PER_ROUND = range(3)
-FAR = np.float32(2.0**24)  # pixels
+FAR, FARTHEST = np.float32(2.0**24), np.float32(2.0**26)  # pixels: a place is moved no farther off, and seen from there
 _MARGIN = 1e-3  # of the exponent and of the box
 _SLENDER = 2.0**14  # product of the variances over the determinant: beyond, rounding decides too much
 _ROUNDING = 2.0**-16
@@ -32,14 +32,14 @@ def visible_reach(conic: Any, reach: Any) -> None:
     """
     a, b, c, opacity = np.float64(conic[0]), np.float64(conic[1]), np.float64(conic[2]), np.float64(conic[3])
     det = a * c - b * b
-    reach[WIDE], reach[HIGH], reach[LEAST_POWER] = FAR, FAR, -np.inf
+    reach[WIDE], reach[HIGH], reach[LEAST_POWER] = FARTHEST, FARTHEST, -np.inf
     if 0.0 <= opacity < 0.999 * np.float64(LEAST_ALPHA):
-        reach[WIDE], reach[HIGH], reach[LEAST_POWER] = -FAR, -FAR, np.inf
+        reach[WIDE], reach[HIGH], reach[LEAST_POWER] = -FARTHEST, -FARTHEST, np.inf
     elif a > 0.0 and c > 0.0 and det * _SLENDER > a * c and opacity < 1e6:
         power = np.log(opacity * 255.0) + _MARGIN
         square = max(2.0 * power * (1.0 + _ROUNDING * (a * c / det)) + _MARGIN, 0.0)
-        reach[WIDE] = min(np.sqrt(square * c / det) * (1.0 + _MARGIN) + _MARGIN, FAR)
-        reach[HIGH] = min(np.sqrt(square * a / det) * (1.0 + _MARGIN) + _MARGIN, FAR)
+        reach[WIDE] = min(np.sqrt(square * c / det) * (1.0 + _MARGIN) + _MARGIN, FARTHEST)
+        reach[HIGH] = min(np.sqrt(square * a / det) * (1.0 + _MARGIN) + _MARGIN, FARTHEST)
         reach[LEAST_POWER] = -power - _MARGIN
 
 

@@ -108,7 +108,7 @@ def _gaussian(
     px, py = pixel(ndc_x, lens.width), pixel(ndc_y, lens.height)
     c0, c1, r0, r1 = square_tiles(px, py, radius, tiles)
     count = (c1 - c0) * (r1 - r0)
-    if count <= 0:
+    if count <= 0 or radius <= 0:  # of a covariance that is no number: 0, for which duplication writes nothing
         return 2
     out.radii[i], out.tiles[i], out.depths[i] = radius, count, depth
     out.positions[i, 0], out.positions[i, 1] = px, py

@@ -7,7 +7,7 @@ import numpy as np
 from tilestamp.models.kernel import kernel
 
 _ONE = np.float32(1)
-_LARGEST = np.float32(2147483520)  # below 2**31
+_LEAST, _LARGEST = -(2.0**31), 2.0**31 - 1.0
 
 
 class Tiles(NamedTuple):
@@ -41,7 +41,7 @@ def to_int(value: Any) -> Any:
     """Float to int32 as CUDA does: towards zero, saturating, NaN to 0."""
     if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
         return np.int64(0)
-    return np.int64(min(max(value, -_LARGEST), _LARGEST))
+    return np.int64(min(max(np.float64(value), _LEAST), _LARGEST))
 
 
 @kernel(lent=True, inline=True)
