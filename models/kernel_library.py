@@ -61,7 +61,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
     def _link_into(self, module: Any) -> None:
         """Add what is reached, each function once, and hide it: names are unique in one process alone."""
         own = set(_defined(module))
-        seen, left = {id(self)}, list(self._linking_libraries)
+        seen, left, finished = {id(self)}, list(self._linking_libraries), []
         while left:
             library = left.pop(0)
             if id(library) in seen:
@@ -72,18 +72,23 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
                 left += library._linking_libraries  # noqa: SLF001
                 module.link_in(library._own_module(), preserve=True)  # noqa: SLF001
             else:
-                module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001
+                finished.append(library)
+        for library in finished:  # last: of a finished one LLVM takes only what is called by then
+            module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001
         for name in _defined(module):
             if name not in own:
                 module.get_function(name).linkage = "internal"
 
     def _own_module(self) -> Any:
-        """Its code as others may link it, several times."""
+        """Its code as others may link it, several times; weak, since of ``linkonce`` only what is called is taken.
+
+        What is called may come later: another that calls it, of which this one is no longer looked at.
+        """
         if self._own is None:
             self._own = self._final_module.clone()
             for function in self._own.functions:
                 if not function.is_declaration and function.linkage.name == "external":
-                    function.linkage = "linkonce_odr"
+                    function.linkage = "weak_odr"
         return self._own
 
 
