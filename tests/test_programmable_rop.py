@@ -195,6 +195,16 @@ def test_a_program_of_the_user_has_words_of_its_own():
     assert np.array_equal(made, expected(what, len))
 
 
+def takes_three(pixel, color, _depth):
+    pixel[0] = color
+
+
+@pytest.mark.parametrize(("program", "words"), [(takes_three, 1), (count_layers, 1)])
+def test_a_function_that_is_no_program_is_refused_in_one_sentence(program, words):
+    with pytest.raises(TilestampError, match=f"blend {program.__name__}: .* {words} words a pixel; this is none"):
+        picture(soup(7), BlendProgram(program, words=words))
+
+
 def frame(blend, machine="gtx480", **options):
     positions, triangles, colors = soup(9, 200)
     mesh = Mesh(positions.astype(np.float32), triangles.astype(np.int32), colors, clip_space=True)

@@ -15,7 +15,6 @@ import numpy as np
 
 from tilestamp.experiments.exploration.transparent_scenes import confetti
 from tilestamp.experiments.frontier.pareto import pareto_front
-from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 QUESTION = "What does transparency without an order of input cost, and how far off are methods that bound its memory?"
+SLOW = True  # runs when it is named: tilestamp reproduce exploration
 MACHINES = ("h200", "gtx480")
 SIDE, REACH = 512, 32.0  # pixels of the screen and across a triangle
 LAYERS = (1, 2, 4, 8, 12)  # fragments a pixel, about
@@ -126,7 +126,6 @@ def measured(made: Run, truth: Run, method: str) -> dict[str, float]:
         "shared_bytes": 4.0 * words(method),
         "rms": float(np.sqrt(np.mean((shown - exact) ** 2))),
         "worst": float(np.abs(shown - exact).max()),
-        "flip": flip(exact / 255.0, made.image),
         "lost": float(facts.get("fragments_lost", 0)),
         "longest": float(facts.get("longest_list", 0)),
         "atomics": float(counts.get("fine_raster.ATOMIC_LANES", 0)),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 QUESTION = "What does a user's program in the ROP cost, and what do fragments of one pixel that meet in a warp?"
+SLOW = True  # runs when it is named: tilestamp reproduce exploration
 MACHINES = ("gtx480", "h200")
 SIDE, LAYERS, LEGS = 384, 8, (2, 4, 8, 16)  # pixels, triangles at a place, pixels of a leg
 PROGRAMS = ("over", "additive", "nearest", "k-buffer", "stochastic")

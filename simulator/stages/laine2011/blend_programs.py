@@ -174,7 +174,7 @@ def compiled(apply: Callable[..., None]) -> Callable[..., None]:
     """Compile the user's function for a whole tile: ``run(pixels, where, colors, depths, keys)``, in order."""
     if config.DISABLE_JIT:
         return _runner(apply)
-    function = apply if isinstance(apply, numba.core.registry.CPUDispatcher) else numba.njit(apply)
+    function = numba.njit(getattr(apply, "py_func", apply), boundscheck=True)  # of the pixel's words
     made: Callable[..., None] = numba.njit(nogil=True)(_runner(function))
     return made
 

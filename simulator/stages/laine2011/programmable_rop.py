@@ -10,8 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
@@ -131,7 +133,7 @@ def programmable_rop(
     Raises
     ------
     TilestampError
-        For a program that does not exist.
+        For a program that does not exist, or that Numba cannot compile or run.
     """
     lists = tile_starts, tile_entries, active_tiles
     name = program if isinstance(program, str) else "user"
@@ -178,6 +180,12 @@ def _blend_by(
         pixels = np.zeros((PIXELS, program.words), np.int64)
         pixels[:, 0] = draw.clear_color
         here = slice(fragments.first[a], fragments.first[a + 1])
-        run(pixels, fragments.pixel[here], fragments.color[here], fragments.depth[here], keys[here])
+        try:
+            run(pixels, fragments.pixel[here], fragments.color[here], fragments.depth[here], keys[here])
+        except (NumbaError, TypeError, IndexError) as error:
+            raise TilestampError(
+                f"blend {program.apply.__name__}: Numba compiles a function of (pixel, color, depth, key) that has"
+                f" {program.words} words a pixel; this is none"
+            ) from error
         x, y = tile % draw.tiles_x * TILE, tile // draw.tiles_x * TILE
         image[y : y + TILE, x : x + TILE] = (pixels[:, 0] & 0xFFFFFFFF).reshape(TILE, TILE)[:, ::-1]
