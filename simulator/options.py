@@ -32,7 +32,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     """Values of all options, checked: whole floats and NumPy's scalars have become what the field says."""
 
     persistent: ClassVar[bool] = False
-    """Whether a kernel launches as many blocks as there are SMs, which then share out the work by a queue."""
+    """Whether a kernel launches a number of blocks for each SM, which share out the work: by a queue, or evenly."""
 
     def __post_init__(self) -> None:
         for field in msgspec.structs.fields(self):

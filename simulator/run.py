@@ -104,7 +104,7 @@ class Run(PricedFrame):
 
     def _check_counted_for(self, machine: Machine) -> None:
         """Refuse a machine that would have counted otherwise."""
-        persistent = any(isinstance(work, Work) and work.dispatch != "blocks" for work in self.frame.works)
+        persistent = any(isinstance(work, Work) and work.persistent for work in self.frame.works)
         if differences := self.machine.simt.differences(machine.simt, persistent=persistent):
             told = ", ".join(differences)
             raise TilestampError(f"this run was not counted for {machine.name} ({told}): simulate again on it")

@@ -37,6 +37,8 @@ class Work:
         Global atomic requests by 32-byte chunk of the target buffer.
     variant : str
         How the kernel was compiled, where that changes its code (``"tile 8 spp 4"``): a mix may price it by itself.
+    grid_by_sms : bool
+        Whether the grid is a number of blocks for each SM, though no queue hands out their work.
     """
 
     stage: str
@@ -50,6 +52,12 @@ class Work:
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
     variant: str = ""
+    grid_by_sms: bool = False
+
+    @property
+    def persistent(self) -> bool:
+        """Whether what was counted depends on the number of SMs."""
+        return self.grid_by_sms or self.dispatch != "blocks"
 
     @property
     def counters(self) -> tuple[Counter, ...]:

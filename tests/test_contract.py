@@ -50,9 +50,9 @@ def test_triangle_ids_are_minus_one_or_an_input_index(run):
     assert run.triangle_ids.max() >= 0
 
 
-def test_a_queue_that_as_many_blocks_as_sms_share_is_declared_with_the_options(run):
-    queued = any(isinstance(work, Work) and work.dispatch != "blocks" for work in run.frame.works)
-    assert options_type(run.pipeline).persistent == queued
+def test_a_grid_that_depends_on_the_number_of_sms_is_declared_with_the_options(run):
+    persistent = any(isinstance(work, Work) and work.persistent for work in run.frame.works)
+    assert options_type(run.pipeline).persistent == persistent
 
 
 def test_no_event_is_negative(run):

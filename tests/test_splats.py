@@ -285,6 +285,13 @@ def test_a_radius_without_bound_is_the_largest_integer():
     assert to_int(np.float32(np.nan)) == 0
 
 
+def test_a_machine_of_other_sms_has_another_histogram_and_so_another_run():
+    run = simulate("playbot", "splat", "h200", width=64, height=48)
+    assert run.on("h100").milliseconds == simulate("playbot", "splat", "h100", width=64, height=48).milliseconds
+    with pytest.raises(TilestampError, match="sms 132 and 108"):
+        run.on("a100")
+
+
 def test_any_camera_of_right_angles_sees_what_its_pinhole_sees():
     through = simulate(scene(), "splat", "h200", width=WIDTH, height=HEIGHT, fidelity="counts",
                        camera=PinholeCamera(FORWARD).matrix(WIDTH, HEIGHT))  # fmt: skip

@@ -48,6 +48,7 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     """Options of the pipeline splat."""
 
     splats: ClassVar[bool] = True
+    persistent: ClassVar[bool] = True
     maps: ClassVar[dict[str, str]] = {
         "pairs": "Gaussians in the list of a tile",
         "evaluations": "Gaussians evaluated at a pixel of a tile",

@@ -218,6 +218,7 @@ def _histogram_work(pairs: int, key_bytes: int, used: NDArray[np.bool_], simt: S
         shared_bytes=HISTOGRAM_SHARED_BYTES,
         streams=(Stream("keys", "load", key_bytes * pairs, key_bytes * pairs),),
         atomic_requests=sectors.ravel() * table[:, _E.LISTED].sum(),
+        grid_by_sms=True,
     )
 
 
