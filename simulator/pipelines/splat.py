@@ -5,6 +5,7 @@ Modelled
 - The forward pass of the published CUDA sources, operation by operation in float32 with its fused multiply-adds, and
   the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
+- Order at each pixel by a sorted window of registers, the simplest mode of StopThePop (``order``).
 - The blending loop of the backward pass, counted (``gradients``): nine atomics a pixel and Gaussian, or a warp.
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.
 
@@ -28,8 +29,9 @@ from tilestamp.simulator.scenes.pinhole import Pinhole
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.kerbl2023.blend import blend, blend_work
 from tilestamp.simulator.stages.kerbl2023.blend_pixels import Pixels
+from tilestamp.simulator.stages.kerbl2023.blend_resort import blend_resort, resort_work
 from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate, keys_of
-from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
+from tilestamp.simulator.stages.kerbl2023.events import BlendEvent, ResortEvent
 from tilestamp.simulator.stages.kerbl2023.gradients import gradients
 from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected, project
@@ -66,6 +68,13 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     """Bits of a key. Of 32 the tile leaves some for the depth, the highest: less is sorted, in fewer passes, and what
     lies close together keeps the order of the file."""
 
+    order: Literal["tile", "pixel"] = "tile"
+    """Blend a tile's list in the order of the centres, or at each pixel by the depth at which a Gaussian is densest
+    along its ray: by a window that a thread keeps sorted, which is exact where no pixel needs a longer one."""
+
+    window: Literal[4, 8, 16, 24] = 16
+    """Gaussians of that window."""
+
     gradients: Literal["none", "lanes", "reduced"] = "none"
     """Count the blending loop of the backward pass, too: its atomics by each lane, or added up in each warp before."""
 
@@ -73,6 +82,8 @@ class SplatOptions(Options, frozen=True, kw_only=True):
         super().__post_init__()
         if self.gradients != "none" and self.threads not in (None, self.pixels):
             raise TilestampError("gradients: the backward pass has a thread a pixel: leave out threads")
+        if self.order == "pixel" and (self.threads not in (None, self.pixels) or self.gradients != "none"):
+            raise TilestampError("order: a pixel sorts with a thread of its own, and has no backward pass")
         if self.threads is not None and self.threads > self.pixels:
             raise TilestampError(f"threads: a tile of {self.tile} has {self.pixels} pixels, fewer than {self.threads}")
 
@@ -92,6 +103,8 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """A pass of the sort; the blending loop has a thread for each pixel of a tile, or fewer."""
         tiles, none = tiles_of(*self.sides, *self.sides), np.zeros((0, len(_E)), np.int64)
+        if self.order == "pixel":
+            return [pass_work(none), resort_work(np.zeros((0, len(ResortEvent)), np.int64), tiles, self.window)]
         return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels)]
 
 
@@ -126,7 +139,11 @@ def splat(
     starts = execute(ranges, pairs.keys, tiles.total, simt, depth_bits=keys.depth_bits).outputs
     colours = colours_seen(splats, camera)
     threads = options.threads or options.pixels
-    pixels, works, _ = execute(blend, starts, pairs.values, projected, colours, tiles, simt, threads=threads)
+    listed = (starts, pairs.values, projected, colours)
+    if options.order == "pixel":
+        pixels, works, _ = execute(blend_resort, *listed, splats, camera, tiles, simt, window=options.window)
+    else:
+        pixels, works, _ = execute(blend, *listed, tiles, simt, threads=threads)
     if options.gradients != "none" and works:
         inputs = (works[0], pixels, pairs.values, len(splats), tiles, simt)
         execute(gradients, *inputs, atomics=options.gradients)
@@ -164,8 +181,10 @@ def _maps(
     lists: NDArray[np.int64], works: tuple[Work, ...], pixels: Pixels, tiles: Tiles
 ) -> dict[str, NDArray[np.generic]]:
     """Heat maps: a cell a tile, and a pixel of what its list reached."""
-    table = works[0].table if works else np.zeros((tiles.total, len(_E)), np.int64)
-    made, used = table[:, _E.EVALUATIONS], table[:, _E.BLENDED]
+    made, used = (
+        works[0].table[:, works[0].events[name]] if works else np.zeros(tiles.total, np.int64)
+        for name in ("EVALUATIONS", "BLENDED")
+    )  # fmt: skip
     efficiency = np.divide(used, made, out=np.zeros(len(made)), where=made > 0)
     shape = (tiles.rows, tiles.columns)
     maps = {"pairs": lists, "evaluations": made, "efficiency": efficiency}

@@ -57,7 +57,7 @@ _E = BlendEvent
 
 
 @kernel(lent=True)
-def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
+def load_entries(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
     """Gather the entries of a tile."""
     for k in range(count):
         i = listed[first + k]
@@ -106,7 +106,7 @@ def _tile(
 
 
 @kernel
-def _reach(part: int, parts: int, out: Projected, reaches: Any) -> None:
+def reach_all(part: int, parts: int, out: Projected, reaches: Any) -> None:
     """Find how far the Gaussians of a part may be seen."""
     for i in range(len(reaches) * part // parts, len(reaches) * (part + 1) // parts):
         if out.radii[i]:
@@ -136,7 +136,7 @@ def _blend(
     for tile in range(begin, end):
         first, count = starts[tile], starts[tile + 1] - starts[tile]
         row = None if table is None else table[tile]
-        _load(first, count, listed, out, colours, reaches, room)
+        load_entries(first, count, listed, out, colours, reaches, room)
         _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
@@ -197,7 +197,7 @@ def blend(
     block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     reaches = np.empty((len(colours), REACH), np.float32)
-    for_parts(_reach, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
+    for_parts(reach_all, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
     inputs = (starts, listed, projected, colours, reaches, tiles, block, over, pixels, table)
     for_parts(_blend, parts_of(tiles.total, _PART), *inputs)
     return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
