@@ -119,7 +119,7 @@ def test_the_frontier_has_a_point_for_each_rule_tile_and_precision(monkeypatch):
     monkeypatch.setattr(frontier, "WIDTH", 120)
     monkeypatch.setattr(frontier, "HEIGHT", 90)
     points = frontier.run(lambda _: None).tables["points"].set_index(["rule", "tile"])
-    assert len(points) == points.index.nunique() == 3 * 3 * 2 + 4
+    assert len(points) == points.index.nunique() == 3 * 3 * 3 + 4
     assert points.rms["ellipse, window 16", 16] < 0.5 * points.rms["ellipse", 16]
     assert (points.ms > 0).all()
     assert points.front.any()

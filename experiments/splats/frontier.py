@@ -106,8 +106,10 @@ def points(
     level: str, scene: Scene, camera: Pinhole, exact: "NDArray[np.float64]", rule: str, tile: int
 ) -> list[dict[str, Any]]:
     """Time and error of one frame in the order of centres, with floats and with half precision."""
-    made = drawn(scene, camera, bound=rule, tile=tile)
+    made, masked = (drawn(scene, camera, bound=rule, tile=tile, mask=mask) for mask in (False, True))
     return [
+        {"level": level, "rule": f"{rule}, mask", "order": "centres", "window": 0, "precision": "float"}
+        | point(masked, exact, tile),
         {"level": level, "rule": rule, "order": "centres", "window": 0, "precision": "float"}
         | point(made, exact, tile),
         {"level": level, "rule": f"{rule}, half", "order": "centres", "window": 0, "precision": "half"}

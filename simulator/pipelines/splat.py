@@ -64,6 +64,10 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     threads: Literal[32, 64, 128, 256, 512, 1024] | None = None
     """Threads of a block of the blending loop, fewer than a tile has pixels: each then has several; by default one."""
 
+    mask: bool = False
+    """Keep a bit mask of the pixels that are not done in each warp of the blending loop, and skip entries whose box
+    has none of them."""
+
     key: Literal[64, 32] = 64
     """Bits of a key. Of 32 the tile leaves some for the depth, the highest: less is sorted, in fewer passes, and what
     lies close together keeps the order of the file."""
@@ -84,6 +88,8 @@ class SplatOptions(Options, frozen=True, kw_only=True):
             raise TilestampError("gradients: the backward pass has a thread a pixel: leave out threads")
         if self.order == "pixel" and (self.threads not in (None, self.pixels) or self.gradients != "none"):
             raise TilestampError("order: a pixel sorts with a thread of its own, and has no backward pass")
+        if self.mask and (self.threads not in (None, self.pixels) or self.order == "pixel"):
+            raise TilestampError("mask: of pixels that have a thread each and are blended in the order of the tile")
         if self.threads is not None and self.threads > self.pixels:
             raise TilestampError(f"threads: a tile of {self.tile} has {self.pixels} pixels, fewer than {self.threads}")
 
@@ -105,7 +111,7 @@ class SplatOptions(Options, frozen=True, kw_only=True):
         tiles, none = tiles_of(*self.sides, *self.sides), np.zeros((0, len(_E)), np.int64)
         if self.order == "pixel":
             return [pass_work(none), resort_work(np.zeros((0, len(ResortEvent)), np.int64), tiles, self.window)]
-        return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels)]
+        return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels, mask=self.mask)]
 
 
 def splat(
@@ -143,7 +149,7 @@ def splat(
     if options.order == "pixel":
         pixels, works, _ = execute(blend_resort, *listed, splats, camera, tiles, simt, window=options.window)
     else:
-        pixels, works, _ = execute(blend, *listed, tiles, simt, threads=threads)
+        pixels, works, _ = execute(blend, *listed, tiles, simt, threads=threads, mask=options.mask)
     if options.gradients != "none" and works:
         inputs = (works[0], pixels, pairs.values, len(splats), tiles, simt)
         execute(gradients, *inputs, atomics=options.gradients)
