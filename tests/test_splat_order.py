@@ -10,7 +10,7 @@ from tilestamp.experiments.silicon.splat_inputs import MEASURED
 from tilestamp.experiments.splats import frontier
 from tilestamp.experiments.stability.splats import drawn, pops
 from tilestamp.models.machine import load_machine
-from tilestamp.simulator.reference.splats import composed
+from tilestamp.simulator.reference.splats import Fragments, composed, in_order, stochastic
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.rays import ray_rows
 
@@ -123,6 +123,29 @@ def test_the_frontier_has_a_point_for_each_rule_tile_and_precision(monkeypatch):
     assert points.rms["ellipse, window 16", 16] < 0.5 * points.rms["ellipse", 16]
     assert (points.ms > 0).all()
     assert points.front.any()
+
+
+def one_layer(alpha, count=40_000):
+    """A fragment of white at each pixel of a long row."""
+    places = np.arange(count)
+    return Fragments(places, np.zeros(count, np.int64), np.full(count, alpha), np.ones(count))
+
+
+@pytest.mark.parametrize(("alpha", "samples"), [(0.5, 1), (0.2, 4), (0.9, 16)])
+def test_stochastic_transparency_has_the_mean_and_the_variance_of_coin_flips(alpha, samples):
+    shown = stochastic(one_layer(alpha), np.ones((1, 3), np.float32), 40_000, 1, samples)[0, :, 0]
+    assert shown.mean() == pytest.approx(alpha, abs=4 * np.sqrt(alpha * (1 - alpha) / samples / 40_000))
+    assert shown.var() == pytest.approx(alpha * (1 - alpha) / samples, rel=0.05)
+
+
+def test_the_mean_of_many_samples_is_the_sorted_picture():
+    run, splats = draw(bound="box"), scene().splats
+    projected = Projected(**{name: run.frame.buffers[name] for name in Projected._fields})
+    found = in_order(splats, projected, FORWARD, WIDTH, HEIGHT)
+    apart = [
+        np.sqrt(np.mean((stochastic(found, splats.colours, WIDTH, HEIGHT, n) - truth(run)) ** 2)) for n in (4, 256)
+    ]
+    assert apart[1] == pytest.approx(apart[0] / 8, rel=0.1)
 
 
 def test_half_precision_is_no_finer_than_a_thousandth():

@@ -5,6 +5,8 @@ The truth is the finest level that is here, blended at each pixel in the order o
 are all errors. Half precision rounds conics, opacities and colours to 16 bits; its time is taken to be that of floats,
 since the loads of the blending loop are not what it waits for.
 
+Stochastic transparency, which needs no order, is told by its error alone: no time is modelled for it.
+
 Without levels on the scene search path the embedded one is all there is, and no error of detail is told.
 """
 
@@ -21,7 +23,8 @@ from tilestamp.experiments.studies_shipped.finding import finding, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.reports.methods_plot import panels
-from tilestamp.simulator.reference.splats import composed
+from tilestamp.simulator.reference.splats import composed, stochastic
+from tilestamp.simulator.reference.splats import in_order as fragments_in_order
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.scenes.pinhole import Pinhole, PinholeCamera, pinhole_camera
@@ -43,6 +46,7 @@ EMBEDDED = "playbot"
 LEVELS = ("playbot/3", "playbot/4", "playbot/5", "playbot/6")  # 31,000 to 1,873 Gaussians
 RULES, TILES = ("square", "box", "ellipse"), (8, 16, 32)
 WINDOWS = {8: (4, 16), 16: (4, 16)}  # of pixels that sort, by tile; 1,024 threads have no registers for windows
+SAMPLES = (1, 4, 16)  # a pixel, by chance
 STEP = 255.0  # of a byte
 
 
@@ -60,6 +64,8 @@ def run(progress: Progress) -> Result:
         progress(f"splats/frontier: {name}")
         rows += [row for rule in RULES for tile in TILES for row in points(name, scene, camera, exact, rule, tile)]
         rows += [in_order(name, scene, camera, exact, tile, window) for tile in WINDOWS for window in WINDOWS[tile]]
+    progress("splats/frontier: samples by chance")
+    chance = pd.DataFrame(by_chance(finest, camera, exact))
     table = pd.DataFrame(rows)
     table["front"] = pareto_front(table["ms"], table["rms"])
     title = f"Splats: modelled time on the {MACHINE} against error, {WIDTH}x{HEIGHT}"
@@ -70,7 +76,14 @@ def run(progress: Progress) -> Result:
     ]
     figures = [Figure("frontier", partial(_draw, table, title))]
     return finding(
-        "frontier", title, cells, figures, notes(table), {"points": table}, _missing(scenes), folder="splats"
+        "frontier",
+        title,
+        cells,
+        figures,
+        notes(table, chance),
+        {"points": table, "stochastic": chance},
+        _missing(scenes),
+        folder="splats",
     )
 
 
@@ -90,6 +103,17 @@ def truth(scene: Scene, camera: Pinhole) -> "NDArray[np.float64]":
     made, splats = drawn(scene, camera), scene.splats
     assert splats is not None  # noqa: S101 - one of splats
     return composed(splats, colours_seen(splats, camera), projected(made), camera, WIDTH, HEIGHT)
+
+
+def by_chance(scene: Scene, camera: Pinhole, exact: "NDArray[np.float64]") -> list[dict[str, float]]:
+    """Error of stochastic transparency by samples a pixel."""
+    assert scene.splats is not None  # noqa: S101 - one of splats
+    colours, on_screen = colours_seen(scene.splats, camera), projected(drawn(scene, camera))
+    found = fragments_in_order(scene.splats, on_screen, camera, WIDTH, HEIGHT)
+    return [
+        {"samples": samples, "rms": error(stochastic(found, colours, WIDTH, HEIGHT, samples), exact)}
+        for samples in SAMPLES
+    ]
 
 
 def drawn(scene: Scene, camera: Pinhole, **options: Any) -> Run:
@@ -158,7 +182,7 @@ def error(picture: "NDArray[np.floating]", exact: "NDArray[np.float64]") -> floa
     return STEP * float(np.sqrt(np.mean((picture - exact) ** 2)))
 
 
-def notes(table: "pd.DataFrame") -> list[str]:
+def notes(table: "pd.DataFrame", chance: "pd.DataFrame") -> list[str]:
     """Answer first."""
     finest = table[table["level"] == table["level"].iloc[0]]
     plain = finest[(finest["order"] == "centres") & (finest["precision"] == "float")]
@@ -174,7 +198,9 @@ def notes(table: "pd.DataFrame") -> list[str]:
     )
     halves = finest[finest["order"] == "centres"].groupby("precision")["rms"].mean()
     half = f"Half precision of conics, opacities and colours: {halves['float']:.3f} becomes {halves['half']:.3f} steps."
-    return [answer, half, *_coarser(table), SURE]
+    told = ", ".join(f"{row['rms']:.1f} with {row['samples']:.0f}" for row in chance.to_dict("records"))
+    random = f"Stochastic transparency, unsorted, is further off: {told} samples a pixel; its time is not modelled."
+    return [answer, half, random, *_coarser(table), SURE]
 
 
 SURE = "Assumed: what sorting at a pixel costs (by hand from its statements); everything else is priced as on the H200."

@@ -27,6 +27,9 @@ class Fragments(NamedTuple):
     depths: NDArray[np.float64]
 
 
+NOTHING = Fragments(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+
+
 def composed(
     splats: Splats, colours: NDArray[np.float32], projected: Projected, camera: Pinhole, width: int, height: int
 ) -> NDArray[np.float64]:
@@ -45,18 +48,55 @@ def composed(
     -------
     ndarray, (height, width, 3), float64
     """
+    found = in_order(splats, projected, camera, width, height)
+    return _picture(found, colours, found.alphas * _left_before(found.pixels, found.alphas), width, height)
+
+
+def stochastic(
+    found: Fragments, colours: NDArray[np.float32], width: int, height: int, samples: int, seed: int = 0
+) -> NDArray[np.float64]:
+    """Stochastic transparency (Enderton et al. 2010): what sorting is not needed for.
+
+    Each fragment is there in a sample of its pixel by chance, with the probability alpha; the nearest that is there is
+    all that the sample shows. The mean is ``composed``; of one layer over black the variance is a (1 - a) / samples.
+
+    Parameters
+    ----------
+    found : Fragments
+        As of ``in_order``.
+    colours : ndarray, (N, 3)
+    width, height : int
+    samples : int
+        A pixel.
+    seed : int
+    """
+    chance, picture = np.random.default_rng(seed), np.zeros((height, width, 3))
+    for _ in range(samples):
+        there = np.flatnonzero(chance.random(len(found.alphas)) < found.alphas)
+        _, nearest = np.unique(found.pixels[there], return_index=True)
+        kept = Fragments(*(part[there[nearest]] for part in found))
+        picture += _picture(kept, colours, np.ones(len(nearest)), width, height) / samples
+    return picture
+
+
+def in_order(splats: Splats, projected: Projected, camera: Pinhole, width: int, height: int) -> Fragments:
+    """What all Gaussians leave, by pixel and from near to far."""
     rows, centres = ray_rows(splats, camera)
     found = [
         fragments(int(i), projected, rows[i], centres[i], camera, width, height)
         for i in np.flatnonzero(projected.radii)
     ]
-    if not found:
-        return np.zeros((height, width, 3))
-    all_of = Fragments(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-    order = np.lexsort((all_of.depths, all_of.pixels))
-    pixels, alphas = all_of.pixels[order], all_of.alphas[order]
-    seen = colours.astype(np.float64)[all_of.splats[order]] * (alphas * _left_before(pixels, alphas))[:, None]
-    planes = [np.bincount(pixels, seen[:, k], width * height) for k in range(3)]
+    whole = Fragments(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else NOTHING
+    order = np.lexsort((whole.depths, whole.pixels))
+    return Fragments(*(part[order] for part in whole))
+
+
+def _picture(
+    found: Fragments, colours: NDArray[np.float32], weights: NDArray[np.float64], width: int, height: int
+) -> NDArray[np.float64]:
+    """Weighted colours, added up at each pixel."""
+    seen = colours.astype(np.float64)[found.splats] * weights[:, None]
+    planes = [np.bincount(found.pixels, seen[:, k], width * height) for k in range(3)]
     return np.stack(planes, axis=1).astype(np.float64).reshape(height, width, 3)
 
 
@@ -74,7 +114,7 @@ def fragments(
     place = projected.positions[i].astype(np.float64)
     det, power = a * c - b * b, 2 * np.log(max(opacity / LEAST_ALPHA, 1e-300))
     if det <= 0 or a <= 0 or power < 0:
-        return Fragments(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+        return NOTHING
     reach = np.sqrt(power * np.array([c, a]) / det)
     (x0, y0), (x1, y1) = np.floor(place - reach), np.ceil(place + reach)
     x, y = np.arange(max(0, x0), min(width, x1 + 1)), np.arange(max(0, y0), min(height, y1 + 1))
