@@ -76,11 +76,18 @@ def cut(opacity: float, tile: int = 4) -> float:
     return difference(square, whole)
 
 
-def pops(sigmas: float) -> bool:
+def pops(sigmas: float, order: str = "tile") -> bool:
     """Whether two Gaussians of one depth, some deviations apart, jump as the camera turns by 0.01 degrees."""
     means = [(-0.05 * sigmas, 0.0, 2.0), (0.05 * sigmas, 0.0, 2.0)]
-    left, right = (drawn(means, 0.1, 0.9, turn, bound="box", fidelity="counts") for turn in (-0.005, 0.005))
+    left, right = (
+        drawn(means, 0.1, 0.9, turn, bound="box", order=order, fidelity="counts") for turn in (-0.005, 0.005)
+    )
     return difference(left, right) > STEP
+
+
+def sorting(order: str) -> float:
+    """Milliseconds of the frame of two Gaussians that pop."""
+    return drawn([(-0.15, 0.0, 2.0), (0.15, 0.0, 2.0)], 0.1, 0.9, bound="box", order=order).milliseconds
 
 
 def lost_near(depth: float) -> bool:
@@ -137,7 +144,7 @@ def boundaries() -> list[Boundary]:
         Boundary(
             "splat, order by centres", "distance", "sigmas", *bisect(pops, 12.0, 0.5),
             "two Gaussians change places at once as the camera turns: the picture jumps",
-            "sort at each pixel", "not measured here",
+            "order=pixel", f"{sorting('pixel') - sorting('tile'):+.4f} ms on {MACHINE} for the two, which jump no more",
         ),
         Boundary(
             "splat, near plane", "depth", "", *bisect(lost_near, 1.0, 0.05),

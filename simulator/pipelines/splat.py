@@ -6,6 +6,7 @@ Modelled
   the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
 - Two scales (``two_scale``): lists of macro tiles of 8x4 tiles, blended tile by tile in batches, as HiGS does.
+- Order at each pixel by a sorted window of registers, the simplest mode of StopThePop (``order``).
 - The blending loop of the backward pass, counted (``gradients``): nine atomics a pixel and Gaussian, or a warp.
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.
 
@@ -29,8 +30,9 @@ from tilestamp.simulator.scenes.pinhole import Pinhole
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.kerbl2023.blend import blend, blend_work
 from tilestamp.simulator.stages.kerbl2023.blend_pixels import Pixels
+from tilestamp.simulator.stages.kerbl2023.blend_resort import blend_resort, resort_work
 from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, duplicate, keys_of
-from tilestamp.simulator.stages.kerbl2023.events import BlendEvent
+from tilestamp.simulator.stages.kerbl2023.events import BlendEvent, ResortEvent
 from tilestamp.simulator.stages.kerbl2023.gradients import gradients
 from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected, project
@@ -67,9 +69,20 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     threads: Literal[32, 64, 128, 256, 512, 1024] | None = None
     """Threads of a block of the blending loop, fewer than a tile has pixels: each then has several; by default one."""
 
+    mask: bool = False
+    """Keep a bit mask of the pixels that are not done in each warp of the blending loop, and skip entries whose box
+    has none of them."""
+
     key: Literal[64, 32] = 64
     """Bits of a key. Of 32 the tile leaves some for the depth, the highest: less is sorted, in fewer passes, and what
     lies close together keeps the order of the file."""
+
+    order: Literal["tile", "pixel"] = "tile"
+    """Blend a tile's list in the order of the centres, or at each pixel by the depth at which a Gaussian is densest
+    along its ray: by a window that a thread keeps sorted, which is exact where no pixel needs a longer one."""
+
+    window: Literal[4, 8, 16, 24] = 16
+    """Gaussians of that window."""
 
     gradients: Literal["none", "lanes", "reduced"] = "none"
     """Count the blending loop of the backward pass, too: its atomics by each lane, or added up in each warp before."""
@@ -82,8 +95,14 @@ class SplatOptions(Options, frozen=True, kw_only=True):
         super().__post_init__()
         if self.two_scale and (self.tile not in (8, 16) or self.threads or self.gradients != "none"):
             raise TilestampError("two_scale: tiles of 8 or 16, a warp a tile: leave out threads and gradients")
+        if self.two_scale and (self.order == "pixel" or self.mask):
+            raise TilestampError("two_scale: blended in the order of the tile, without masks of pixels")
         if self.gradients != "none" and self.threads not in (None, self.pixels):
             raise TilestampError("gradients: the backward pass has a thread a pixel: leave out threads")
+        if self.order == "pixel" and (self.threads not in (None, self.pixels) or self.gradients != "none"):
+            raise TilestampError("order: a pixel sorts with a thread of its own, and has no backward pass")
+        if self.mask and (self.threads not in (None, self.pixels) or self.order == "pixel"):
+            raise TilestampError("mask: of pixels that have a thread each and are blended in the order of the tile")
         if self.threads is not None and self.threads > self.pixels:
             raise TilestampError(f"threads: a tile of {self.tile} has {self.pixels} pixels, fewer than {self.threads}")
 
@@ -109,7 +128,9 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """A pass of the sort; the blending loop has a thread for each pixel of a tile, or fewer."""
         tiles, none = tiles_of(*self.sides, *self.sides), np.zeros((0, len(_E)), np.int64)
-        return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels)]
+        if self.order == "pixel":
+            return [pass_work(none), resort_work(np.zeros((0, len(ResortEvent)), np.int64), tiles, self.window)]
+        return [pass_work(none), blend_work(none, tiles, self.threads or self.pixels, mask=self.mask)]
 
 
 def splat(
@@ -142,15 +163,19 @@ def splat(
     pairs = execute(sort, pairs, keys.sorted_bits, simt).outputs
     starts = execute(ranges, pairs.keys, tiles.total, simt, depth_bits=keys.depth_bits).outputs
     colours = colours_seen(splats, camera)
-    inputs = (starts, pairs.values, projected, colours, tiles)
+    inputs = (starts, pairs.values, projected, colours)
     if options.two_scale:
         small = tiles_of(width, height, *options.sides)
-        partials, works, _ = execute(blend_batches, *inputs, small, simt, bound=options.bound)
+        partials, works, _ = execute(blend_batches, *inputs, tiles, small, simt, bound=options.bound)
         pixels = execute(blend_partials, partials, tiles, small, simt).outputs
         table = by_macro_tile(partials, works)
     else:
-        pixels, works, _ = execute(blend, *inputs, simt, threads=options.threads or options.pixels)
-        table = works[0].table[:, [_E.EVALUATIONS, _E.BLENDED]] if works else np.zeros((tiles.total, 2), np.int64)
+        if options.order == "pixel":
+            pixels, works, _ = execute(blend_resort, *inputs, splats, camera, tiles, simt, window=options.window)
+        else:
+            threads = options.threads or options.pixels
+            pixels, works, _ = execute(blend, *inputs, tiles, simt, threads=threads, mask=options.mask)
+        table = _evaluations(works, tiles)
     if options.gradients != "none" and works:
         done = (works[0], pixels, pairs.values, len(splats), tiles, simt)
         execute(gradients, *done, atomics=options.gradients)
@@ -182,6 +207,14 @@ def _depth(
     tile = y // tiles.tile_y * tiles.columns + x // tiles.tile_x
     depth[y, x] = projected.depths[pairs.values[starts[tile] + pixels.reached[y, x] - 1]]
     return depth
+
+
+def _evaluations(works: tuple[Work, ...], tiles: Tiles) -> NDArray[np.int64]:
+    """Evaluations and blends of each tile, (tiles, 2)."""
+    if not works:
+        return np.zeros((tiles.total, 2), np.int64)
+    events = works[0].events
+    return works[0].table[:, [events["EVALUATIONS"], events["BLENDED"]]]
 
 
 def _maps(

@@ -52,12 +52,13 @@ from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
 from tilestamp.simulator.work import Work
 
 SHARED_BYTES = INDEX_BYTES + POSITION_BYTES + CONIC_BYTES  # a thread
+BOX_BYTES = 8  # first and last column and row, of 16 bits
 _PART, _PART_GAUSSIANS = 8, 1 << 14  # tiles and Gaussians of one call, at least
 _E = BlendEvent
 
 
 @kernel(lent=True)
-def _load(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
+def load_entries(first: int, count: int, listed: Any, out: Projected, colours: Any, reaches: Any, room: Room) -> None:
     """Gather the entries of a tile."""
     for k in range(count):
         i = listed[first + k]
@@ -91,7 +92,7 @@ def _tile(
             totals = room.totals[warp, slot]
             walk(
                 room.entries, room.boxes, count, room.state, lasts, room.alive, rectangle, block.threads,
-                room.rounds[warp, slot], room.marks, room.uses, bit, totals,
+                room.rounds[warp, slot], room.marks, room.uses, bit, totals, block.masked,
             )  # fmt: skip
             store(tile, tiles, begin, end, block.segment, background, room, pixels, row)
             if row is not None:
@@ -106,7 +107,7 @@ def _tile(
 
 
 @kernel
-def _reach(part: int, parts: int, out: Projected, reaches: Any) -> None:
+def reach_all(part: int, parts: int, out: Projected, reaches: Any) -> None:
     """Find how far the Gaussians of a part may be seen."""
     for i in range(len(reaches) * part // parts, len(reaches) * (part + 1) // parts):
         if out.radii[i]:
@@ -136,7 +137,7 @@ def _blend(
     for tile in range(begin, end):
         first, count = starts[tile], starts[tile + 1] - starts[tile]
         row = None if table is None else table[tile]
-        _load(first, count, listed, out, colours, reaches, room)
+        load_entries(first, count, listed, out, colours, reaches, room)
         _tile(tile, tiles, block, count, background, room, pixels, row)
         if row is not None:
             row[_E.WARPS], row[_E.THREADS], row[_E.LIST], row[_E.BLOCKS] = block.warps, block.threads, count, 1
@@ -162,6 +163,7 @@ def blend(
     simt: Simt,
     *,
     threads: int,
+    mask: bool = False,
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     counting: bool = True,
 ) -> StageResult[Pixels]:
@@ -179,6 +181,8 @@ def blend(
     simt : Simt
     threads : int
         Of a block: a divisor of the pixels of a tile.
+    mask : bool
+        Warps keep a bit mask of their pixels that are not done, and skip entries whose box has none of them.
     background : tuple of float
     counting : bool
 
@@ -194,16 +198,16 @@ def blend(
         np.empty(shape, np.uint32),
         np.zeros((len(listed) if counting else 0, 2), np.int32),
     )
-    block, over = block_of(tiles, threads, simt), np.array(background, np.float32)
+    block, over = block_of(tiles, threads, simt, mask=mask), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     reaches = np.empty((len(colours), REACH), np.float32)
-    for_parts(_reach, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
+    for_parts(reach_all, parts_of(len(colours), _PART_GAUSSIANS), projected, reaches)
     inputs = (starts, listed, projected, colours, reaches, tiles, block, over, pixels, table)
     for_parts(_blend, parts_of(tiles.total, _PART), *inputs)
-    return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours)),))
+    return StageResult(pixels, () if table is None else (blend_work(table, tiles, threads, len(colours), mask=mask),))
 
 
-def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int = 0) -> Work:
+def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int = 0, *, mask: bool = False) -> Work:
     """Work of the kernel, from the rows of all tiles."""
     total = dict(zip(_E, table.sum(axis=0).tolist(), strict=True))
     entries, pixels, fetches = total[_E.ENTRIES], total[_E.PIXELS], total[_E.COLOUR_FETCHES]  # later warps find L1
@@ -217,8 +221,8 @@ def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int 
         table=table,
         grid=len(table),
         block=threads,
-        shared_bytes=SHARED_BYTES * threads,
-        variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}",
+        shared_bytes=(SHARED_BYTES + BOX_BYTES * mask) * threads,
+        variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}{' mask' if mask else ''}",
         streams=(
             Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
             Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),

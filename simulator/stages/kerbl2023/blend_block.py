@@ -28,6 +28,7 @@ class Block(NamedTuple):
     warps: int
     segment: int  # bytes of the smallest transaction
     parts: int  # of 32 lanes in a warp
+    masked: int  # 1 where warps skip entries whose box no pixel that is not done lies in
 
 
 class Room(NamedTuple):
@@ -44,11 +45,13 @@ class Room(NamedTuple):
     stamps: NDArray[np.int64]  # (2, sectors of the conics): by which gather a sector was touched last
 
 
-def block_of(tiles: Tiles, threads: int, simt: Simt) -> Block:
+def block_of(tiles: Tiles, threads: int, simt: Simt, *, mask: bool = False) -> Block:
     """Give the block of a tile."""
     segment = smallest_transaction_bytes(int(simt.coalescing))
     warps = -(-threads // simt.warp)
-    return Block(threads, tiles.pixels // threads, simt.warp, warps, segment, -(-min(simt.warp, threads) // LANES))
+    return Block(
+        threads, tiles.pixels // threads, simt.warp, warps, segment, -(-min(simt.warp, threads) // LANES), int(mask)
+    )
 
 
 @kernel(lent=True)
@@ -75,12 +78,13 @@ def count_rounds(count: int, block: Block, room: Room, row: Any) -> None:
     """Rounds of the block and its warps, and in each the warp that the others wait for."""
     longest = 0
     for warp in range(block.warps):
-        trips = 0
+        trips, walked = 0, 0
         for slot in range(block.pixels):
             trips = max(trips, room.totals[warp, slot, group.TRIPS])
+            walked = max(walked, room.totals[warp, slot, group.WALKED])
         row[_E.TRIPS] += trips
-        row[_E.WARP_BATCHES] += (trips + block.threads - 1) // block.threads
-        longest = max(longest, trips)
+        row[_E.WARP_BATCHES] += (walked + block.threads - 1) // block.threads
+        longest = max(longest, walked)
     row[_E.BATCHES] = (longest + block.threads - 1) // block.threads
     row[_E.ENTRIES] = min(count, row[_E.BATCHES] * block.threads)
     row[_E.LEFT] = row[_E.ENTRIES] < count
@@ -90,7 +94,9 @@ def count_rounds(count: int, block: Block, room: Room, row: Any) -> None:
         for warp in range(block.warps):
             trips, steps, blends, runs = 0, 0, 0, 0
             for slot in range(block.pixels):
-                here = min(max(room.totals[warp, slot, group.TRIPS] - begin, 0), block.threads)
+                here = min(max(room.totals[warp, slot, group.WALKED] - begin, 0), block.threads)
+                if block.masked:
+                    here = room.rounds[warp, slot, k, group.ROUND_VISITS]
                 trips, steps = max(trips, here), steps + here
                 blends += room.rounds[warp, slot, k, group.ROUND_BLENDS]
                 runs += room.rounds[warp, slot, k, group.ROUND_RUNS]

@@ -15,9 +15,10 @@ from tilestamp.simulator.stages.kerbl2023.blend_step import LANES, LEAST_ALPHA, 
 BOX = 4  # first and last column and row of pixels
 WIDE, HIGH, LEAST_POWER, REACH = range(4)  # of a Gaussian: half its box, and the power below which alpha is too small
 # Of a group of pixels:
-EVALUATIONS, BLENDED, SKIPPED_POWER, STOPPED, BOUNDED_STEPS, BLEND_STEPS, TRIPS, TOTALS = range(8)
+EVALUATIONS, BLENDED, SKIPPED_POWER, STOPPED, BOUNDED_STEPS, BLEND_STEPS, TRIPS, WALKED, TOTALS = range(9)
 # Of a group in a round:
-ROUND_BLENDS, ROUND_RUNS, PER_ROUND = range(3)
+ROUND_BLENDS, ROUND_RUNS, ROUND_VISITS, PER_ROUND = range(4)
+MASK_GROUP = 32  # entries whose boxes a warp compares at once with the pixels that are not done
 FAR, FARTHEST = np.float32(2.0**24), np.float32(2.0**26)  # pixels: a place is moved no farther off, and seen from there
 _MARGIN = 1e-3  # of the exponent and of the box
 _SLENDER = 2.0**14  # product of the variances over the determinant: beyond, rounding decides too much
@@ -52,9 +53,23 @@ def reach_box(x: Any, y: Any, reach: Any, box: Any) -> None:
 
 
 @kernel(lent=True)
+def touches(box: Any, rectangle: Any, live: Any) -> bool:
+    """Whether a pixel lies in the box whose bit is set in ``live``; rows of the rectangle follow each other there."""
+    left, right, top, bottom = rectangle
+    first, last = np.int64(max(box[0], left) - left), np.int64(min(box[1], right) - left)
+    if last < first:
+        return False
+    bits = (np.uint64(1) << np.uint64(last - first + 1)) - np.uint64(1)
+    for y in range(max(box[2], top), min(box[3], bottom) + 1):
+        if live & (bits << np.uint64((y - top) * (right - left + 1) + first)):
+            return True
+    return False
+
+
+@kernel(lent=True)
 def walk(
     entries: Any, boxes: Any, count: int, state: Any, lasts: Any, alive: Any, rectangle: Any, batch: int,
-    per_round: Any, marks: Any, uses: Any, bit: Any, totals: Any,
+    per_round: Any, marks: Any, uses: Any, bit: Any, totals: Any, masked: int,
 ) -> None:  # fmt: skip
     """Walk along a list.
 
@@ -81,13 +96,25 @@ def walk(
     bit : uint32
     totals : ndarray, (TOTALS,), int64
         Added to.
+    masked : int
+        1 where entries are skipped whose box had no pixel that is not done when their group of 32 was begun.
     """
     left, right, top, bottom = rectangle
     living = 0
     for part in range(len(alive)):
         living += popcount(np.uint64(alive[part]))
-    k, counted, before, unbounded_steps = 0, 0, -2, 0
+    k, visited, counted, before, unbounded_steps, live = 0, 0, 0, -2, 0, np.uint64(0)
     while k < count and living:
+        if masked:
+            if k % MASK_GROUP == 0:
+                live = np.uint64(alive[0])
+                if len(alive) > 1:
+                    live |= np.uint64(alive[1]) << np.uint64(LANES)
+            if not touches(boxes[k], rectangle, live):
+                k += 1
+                continue
+            per_round[k // batch, ROUND_VISITS] += 1
+        visited += 1
         if boxes[k, 0] <= right and boxes[k, 1] >= left and boxes[k, 2] <= bottom and boxes[k, 3] >= top:
             blended, stopped, unbounded = 0, 0, 0
             for part in range(len(alive)):
@@ -103,8 +130,8 @@ def walk(
                 totals[SKIPPED_POWER] += unbounded
                 unbounded_steps += unbounded == living
             if stopped:
-                totals[EVALUATIONS] += living * (k + 1 - counted)
-                counted = k + 1
+                totals[EVALUATIONS] += living * (visited - counted)
+                counted = visited
                 living -= stopped
                 totals[STOPPED] += stopped
             if blended:
@@ -117,6 +144,6 @@ def walk(
                 uses[k, 0] += blended
                 uses[k, 1] += 1
         k += 1
-    totals[EVALUATIONS] += living * (k - counted)
-    totals[TRIPS] = k
-    totals[BOUNDED_STEPS] = k - unbounded_steps
+    totals[EVALUATIONS] += living * (visited - counted)
+    totals[TRIPS], totals[WALKED] = visited, k
+    totals[BOUNDED_STEPS] = visited - unbounded_steps

@@ -168,6 +168,49 @@ class BlendEvent(IntEnum):
 
 
 @shown(
+    count("EVALUATIONS", "evaluations of a Gaussian at a pixel", "sample_tests"),
+    count("BLENDED", "evaluations that were blended", "sample_hits"),
+    count("INSERTED", "Gaussians that a pixel sorted into its window"),
+    count("STOPPED", "pixels that grew opaque"),
+    count("EARLY", "blended behind what is farther: the window was too short"),
+)
+class ResortEvent(IntEnum):
+    """Events of one block of the loop that sorts at each pixel; a block is a tile and has a thread a pixel."""
+
+    WARPS = 0
+    THREADS = 1
+    LIST = 2
+    BATCHES = 3
+    ENTRIES = 4
+    GATHER_WARPS = 5  # warps that load some, and make the rows that depths along rays need
+    WARP_BATCHES = 6
+    STEPS = 7
+    EVALUATIONS = 8  # lanes of the steps
+    EXP_STEPS = 9  # steps with a lane whose power is not positive
+    EXP_LANES = 10
+    INSERT_STEPS = 11  # steps with a lane whose alpha is not too small: depth, and a place in the window
+    INSERTED = 12  # lanes of them
+    SLOTS = 13  # places of the window that such steps go through: all of them, since it lies in registers
+    SLOT_LANES = 14
+    BLEND_STEPS = 15  # steps with a lane whose window is full, or is emptied at the end
+    BLENDED = 16
+    STOPPED = 17
+    DROPPED = 18  # left in the windows of pixels that grew opaque
+    EARLY = 19  # blends that are nearer than the one before at their pixel
+    IDLE_LANES = 20
+    SLOWEST_STEPS = 21  # of the warp with most to do
+    SLOWEST_SLOTS = 22
+    SLOWEST_BLEND_STEPS = 23
+    PIXELS = 24
+    PIXEL_WARPS = 25
+    LOAD_TRANSACTIONS = 26
+    LOAD_BYTES = 27
+    STORE_TRANSACTIONS = 28
+    STORE_BYTES = 29
+    BLOCKS = 30
+
+
+@shown(
     count("EVALUATIONS", "evaluations of a Gaussian at a pixel, from the last that it blended back", "sample_tests"),
     count("BLENDED", "evaluations that have gradients", "sample_hits"),
     ratio("ste", "BLENDED", "EVALUATIONS", "evaluations that have gradients by all"),
