@@ -11,7 +11,7 @@ from tilestamp.simulator.stages.laine2011.exact import fma
 from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
 
 ZERO, HALF, ONE, TWO = (np.float32(x) for x in (0, 0.5, 1, 2))
-HEIGHT, WIDTH = 13, 18
+HEIGHT, WIDTH = 11, 31  # of both 1 / n - 1 rounds otherwise than (1 - n) / n
 
 
 @pytest.fixture(autouse=True)
@@ -85,6 +85,12 @@ def test_a_depth_that_is_no_number_is_1_and_such_a_weight_0():
     out = pixel_barycentrics(ids, corners, tri)[:, 0]
     assert out[:, 2].tolist() == [1, 1]
     assert out[1, :2].tolist() == [0, 0]
+
+
+def test_depths_are_cut_off_at_the_near_and_far_plane():
+    corners = np.array([[-1, -1, z, 1] for z in (-9, 9)] + [[1, -1, 0, 1], [-1, 1, 0, 1]], np.float32)
+    ids, tri = np.array([[0, -1, -1], [1, -1, -1], [-1, -1, -1]], np.int32), np.array([[0, 2, 3], [1, 2, 3]], np.int32)
+    assert pixel_barycentrics(ids, corners, tri)[:2, 0, 2].tolist() == [-1, 1]
 
 
 def image():

@@ -218,6 +218,19 @@ def test_the_pixel_that_a_silhouette_cuts_gets_its_share_of_colour(edge):
     assert np.allclose(out, np.clip(edge - np.arange(8), 0, 1), atol=1e-6)
 
 
+@pytest.mark.parametrize("edge", [3.6, 4.4])
+def test_a_silhouette_before_a_farther_triangle_blends_along_both_axes(edge):
+    pos, _ = half_plane(edge)
+    behind = np.array([[[-9, -9, 0.5, 1], [9, -9, 0.5, 1], [0, 9, 0.5, 1]]], np.float32)
+    pos, tri = np.concatenate([pos, behind], axis=1), np.array([[0, 1, 2], [3, 4, 5]], np.int32)
+    for axes in ([0, 1, 2, 3], [1, 0, 2, 3]):
+        turned = pos[..., axes].copy()
+        rast, _ = rasterize(turned, tri, (8, 8))
+        out = antialias((rast[..., 3:] == 1).astype(np.float32), rast, turned, tri)[0, ..., 0]
+        along = out[4] if axes[0] == 0 else out[:, 4]
+        assert np.allclose(along, np.clip(edge - np.arange(8), 0, 1), atol=1e-6)
+
+
 def test_an_edge_between_triangles_of_one_surface_blends_nothing():
     pos = np.array([[[-2, -2, 0, 1], [2, -2, 0, 1], [-2, 2, 0, 1], [2, 2, 0, 1]]], np.float32)
     tri = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
