@@ -58,9 +58,9 @@ def test_the_missing_texel_of_a_corner_is_a_third_of_its_neighbours_sum():
 
 def test_kept_the_missing_texel_of_the_second_map_is_the_first_of_the_first_maps_last_face():
     faces = np.zeros((2, 6, 2, 2, 1))
-    faces[0, 5, 0, 0] = 1
-    assert lookup(faces, (1, 1, 1)).tolist() == [0, 0.25]
-    assert lookup(faces, (1, 1, 1), faults="mended").tolist() == [0, 0]
+    faces[0, 5, 0, 0], faces[1] = 1, 2
+    assert lookup(faces, (1, 1, 1)).tolist() == [0, 1.75]
+    assert lookup(faces, (1, 1, 1), faults="mended").tolist() == [0, 2]
 
 
 @pytest.mark.parametrize(
