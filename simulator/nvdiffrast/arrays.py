@@ -68,7 +68,7 @@ def as_array(name: str, value: object, dtype: type[np.generic], shape: str, *dim
     return np.require(array, requirements=["C", "A", "W"])
 
 
-def _memory_of(name: str, value: Any) -> NDArray[Any] | None:
+def _memory_of(name: str, value: object) -> NDArray[Any] | None:
     """The array of an object, None if it has none."""
     if isinstance(value, np.ndarray):
         return np.asarray(value)
