@@ -10,7 +10,9 @@ from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import FOLDER, altered, list_machines, load_machine
 from tilestamp.models.simt import AtomicMerge, Coalescing
-from tilestamp.simulator.pipelines import pipeline_names
+from tilestamp.simulator.launchable import able_machines
+from tilestamp.simulator.mix import load_mix
+from tilestamp.simulator.pipelines import pipeline_names, pipeline_options
 
 
 @pytest.fixture
@@ -237,3 +239,11 @@ def test_shared_memory_has_the_banks_of_its_generation(name):
     machine = load_machine(name)
     first = machine.compute_capability.startswith("1.")
     assert (machine.memory.banks, machine.memory.bank_lanes) == ((16, 16) if first else (32, 32))
+
+
+@pytest.mark.parametrize("name", [name for name in pipeline_names() if name != "hardware"])
+def test_a_machine_that_may_run_a_pipeline_has_the_registers_of_all_its_kernels(name):
+    """Else a frame is executed, and refused only when it is priced."""
+    for machine in map(load_machine, able_machines(name, pipeline_options(name, {}))):
+        kernels = load_mix(name, machine.compute_capability).kernels.values()
+        assert max(kernel.registers for kernel in kernels) <= machine.sm.max_registers_per_thread, machine.name

@@ -103,15 +103,18 @@ def _diagram(run: Run) -> str:
 
 
 def _stage_table(run: Run) -> str:
-    rows = [[f"`{stage}`", _does(works[0]), _unit(works[0]), _buffers(works)] for stage, works in _stages(run).items()]
+    stages = _stages(run).items()
+    rows = [[f"`{stage}`", _does(run.pipeline, works[0]), _unit(works[0]), _buffers(works)] for stage, works in stages]
     return table(["stage", "what it does", "a unit of work", "buffers"], rows)
 
 
-def _does(work: Any) -> str:
-    """First line of the module where the stage's events are declared."""
+def _does(pipeline: str, work: Any) -> str:
+    """First line of the module of the stage's driver, which bears its name, or of the module of its events."""
     if not isinstance(work, Work):
         return "The fixed-function pipe: " + ", ".join(work.items)
-    return code(inspect.cleandoc(import_module(work.events.__module__).__doc__ or "").splitlines()[0])
+    described = getattr(_module(pipeline), work.stage, None)
+    found = described if inspect.isfunction(described) else work.events
+    return code(inspect.cleandoc(import_module(found.__module__).__doc__ or "").splitlines()[0])
 
 
 def _unit(work: Any) -> str:
