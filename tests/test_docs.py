@@ -148,6 +148,12 @@ def test_every_road_has_a_page_that_shows_its_result():
     assert set(names) == shown
 
 
+def test_the_overview_has_each_road_once_in_the_order_of_the_navigation():
+    overview = re.findall(r"\]\((\w+\.md)\)", (ROOT / "docs" / "exploration" / "index.md").read_text("utf-8"))
+    navigation = re.findall(r"- exploration/(\w+\.md)", (ROOT / "mkdocs.yml").read_text("utf-8"))
+    assert ["index.md", *overview] == navigation
+
+
 def test_the_table_of_silicon_has_the_measured_beside_the_model(generate):
     text = generate("model_tables").silicon()
     cells = [line.split(" | ")[1:3] for line in text.splitlines()[2:]]
