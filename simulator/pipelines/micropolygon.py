@@ -137,7 +137,7 @@ class MicropolygonOptions(Options, frozen=True, kw_only=True):
             raise TilestampError("edges of 16 bits: tiles of 4 or 8, one sample a pixel, box tests, shaded before")
         roads = self.grid > GRID_SIDE or self.shading != "vertices" or self.cull != "none" or self.snap_edges
         if self.relief is not None and (roads or self.bound_rule != "control_points"):
-            raise TilestampError("relief: grids of 4x4 vertices, each shaded by itself, bounded on control points")
+            raise TilestampError("relief: shading vertices, bound_rule control_points, grid 4, no cull, no snap_edges")
         if self.coarse and (self.coarse <= self.tile or self.hybrid):
             raise TilestampError("coarse tiles are larger than tiles, and not for the hybrid")
         if self.has_masks and (self.tile > FINE or self.spp > 1 or not self.box_tests or self.edges != "computed"):
