@@ -225,7 +225,7 @@ def _missing(scenes: dict[str, Scene]) -> list[str]:
     return [f"levels of detail that are not on the scene search path: {', '.join(missing)}"] if missing else []
 
 
-def _draw(table: "pd.DataFrame", title: str, path: Any) -> None:
+def _draw(table: "pd.DataFrame", title: str, path: Path) -> None:
     panels(
         table.assign(second=False), path, panel="level", group="rule", x="ms", y="rms", front="front", second="second",
         x_label="modelled frame [ms]", y_label="error [steps of a byte, RMS]", title=title,

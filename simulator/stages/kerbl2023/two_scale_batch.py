@@ -112,7 +112,7 @@ def blend_tile(
     totals[:] = 0
     walk(
         own.entries, own.boxes, count, room.state, numbers, room.alive, rectangle, DRAIN, room.rounds[0, 0], room.marks,
-        room.uses, np.uint32(1), totals,
+        room.uses, np.uint32(1), totals, np.int64(0),
     )  # fmt: skip
     for lane in range(pixels):
         done = (own.shown[lane // LANES] & ~room.alive[lane // LANES]) >> np.uint32(lane % LANES) & np.uint32(1)
