@@ -5,6 +5,7 @@ Modelled
 - The forward pass of the published CUDA sources, operation by operation in float32 with its fused multiply-adds, and
   the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
+- Two scales (``two_scale``): lists of macro tiles of 8x4 tiles, blended tile by tile in batches, as HiGS does.
 - The blending loop of the backward pass, counted (``gradients``): nine atomics a pixel and Gaussian, or a warp.
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.
 
@@ -38,6 +39,9 @@ from tilestamp.simulator.stages.kerbl2023.scan import scan
 from tilestamp.simulator.stages.kerbl2023.sort import pass_work, sort
 from tilestamp.simulator.stages.kerbl2023.tight_count import tight_count
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles, tiles_of
+from tilestamp.simulator.stages.kerbl2023.two_scale import blend_batches, by_macro_tile
+from tilestamp.simulator.stages.kerbl2023.two_scale_batch import COLUMNS, LINES
+from tilestamp.simulator.stages.kerbl2023.two_scale_join import blend_partials
 from tilestamp.simulator.work import Work
 
 WAITS = 1  # of the host: it reads the number of pairs to size its buffers
@@ -69,8 +73,14 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     gradients: Literal["none", "lanes", "reduced"] = "none"
     """Count the blending loop of the backward pass, too: its atomics by each lane, or added up in each warp before."""
 
+    two_scale: bool = False
+    """List and sort by macro tiles of 8x4 tiles, and blend by tiles: batches of 1024 Gaussians make masks of the tiles
+    that each reaches, and partial results are blended at the end."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.two_scale and (self.tile not in (8, 16) or self.threads or self.gradients != "none"):
+            raise TilestampError("two_scale: tiles of 8 or 16, a warp a tile: leave out threads and gradients")
         if self.gradients != "none" and self.threads not in (None, self.pixels):
             raise TilestampError("gradients: the backward pass has a thread a pixel: leave out threads")
         if self.threads is not None and self.threads > self.pixels:
@@ -88,6 +98,12 @@ class SplatOptions(Options, frozen=True, kw_only=True):
     def pixels(self) -> int:
         """Of a tile."""
         return self.sides[0] * self.sides[1]
+
+    @property
+    def listed(self) -> tuple[int, int]:
+        """Width and height in pixels of what has a list: a tile, or a macro tile."""
+        width, height = self.sides
+        return (COLUMNS * width, LINES * height) if self.two_scale else (width, height)
 
     def launches(self, simt: Simt) -> list[Work]:  # noqa: ARG002 - on every machine alike
         """A pass of the sort; the blending loop has a thread for each pixel of a tile, or fewer."""
@@ -115,7 +131,7 @@ def splat(
     splats = scene.splats
     if splats is None:
         raise TilestampError(f"the scene {scene.name} has no splats, and splat draws nothing else")
-    tiles = tiles_of(width, height, *options.sides)
+    tiles = tiles_of(width, height, *options.listed)
     projected = execute(project, splats, camera, tiles, simt).outputs
     if options.bound != "square":
         projected = execute(tight_count, projected, tiles, simt, bound=options.bound).outputs
@@ -125,17 +141,24 @@ def splat(
     pairs = execute(sort, pairs, keys.sorted_bits, simt).outputs
     starts = execute(ranges, pairs.keys, tiles.total, simt, depth_bits=keys.depth_bits).outputs
     colours = colours_seen(splats, camera)
-    threads = options.threads or options.pixels
-    pixels, works, _ = execute(blend, starts, pairs.values, projected, colours, tiles, simt, threads=threads)
+    inputs = (starts, pairs.values, projected, colours, tiles)
+    if options.two_scale:
+        small = tiles_of(width, height, *options.sides)
+        partials, works, _ = execute(blend_batches, *inputs, small, simt, bound=options.bound)
+        pixels = execute(blend_partials, partials, tiles, small, simt).outputs
+        table = by_macro_tile(partials, works)
+    else:
+        pixels, works, _ = execute(blend, *inputs, simt, threads=options.threads or options.pixels)
+        table = works[0].table[:, [_E.EVALUATIONS, _E.BLENDED]] if works else np.zeros((tiles.total, 2), np.int64)
     if options.gradients != "none" and works:
-        inputs = (works[0], pixels, pairs.values, len(splats), tiles, simt)
-        execute(gradients, *inputs, atomics=options.gradients)
+        done = (works[0], pixels, pairs.values, len(splats), tiles, simt)
+        execute(gradients, *done, atomics=options.gradients)
     lists = np.diff(starts)
     return Frame(
         np.clip(pixels.colours * 255 + np.float32(0.5), 0, 255).astype(np.uint8),
         _depth(pixels, starts, pairs, projected, tiles),
         execute.works,
-        maps=_maps(lists, works, pixels, tiles),
+        maps=_maps(lists, table, pixels, tiles),
         facts={
             "tile": options.tile,
             "visible Gaussians": int(np.count_nonzero(projected.radii)),
@@ -143,7 +166,7 @@ def splat(
             "longest list": int(lists.max()),
             "launches that the host waits for": WAITS,
         },
-        tile=options.sides,
+        tile=options.listed,
         buffers={**projected._asdict(), "keys": pairs.keys, "listed": pairs.values, "starts": starts}
         | pixels._asdict(),
     )
@@ -161,11 +184,10 @@ def _depth(
 
 
 def _maps(
-    lists: NDArray[np.int64], works: tuple[Work, ...], pixels: Pixels, tiles: Tiles
+    lists: NDArray[np.int64], table: NDArray[np.int64], pixels: Pixels, tiles: Tiles
 ) -> dict[str, NDArray[np.generic]]:
-    """Heat maps: a cell a tile, and a pixel of what its list reached."""
-    table = works[0].table if works else np.zeros((tiles.total, len(_E)), np.int64)
-    made, used = table[:, _E.EVALUATIONS], table[:, _E.BLENDED]
+    """Heat maps: a cell a list, and a pixel of what its list reached; the table has evaluations and blends."""
+    made, used = table.T
     efficiency = np.divide(used, made, out=np.zeros(len(made)), where=made > 0)
     shape = (tiles.rows, tiles.columns)
     maps = {"pairs": lists, "evaluations": made, "efficiency": efficiency}
