@@ -8,7 +8,9 @@ from tilestamp.experiments.silicon.splat import fastest_tiles, kernel_names
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME
 from tilestamp.experiments.splats.host import host_ms
 from tilestamp.experiments.splats.tile_size import measured, winners
+from tilestamp.experiments.splats.two_scale import ROADS, SMALL, TWO, best_of_one, frames, times
 from tilestamp.models.machine import load_machine
+from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs
 from tilestamp.simulator.stages.kerbl2023.events import SortEvent
@@ -30,6 +32,15 @@ def test_the_fastest_tile_and_what_another_loses():
     table = pd.DataFrame({"tile": [8, 16, 32], "ms": [2.0, 3.0, 4.0]})
     (row,) = winners(table.assign(scene="s", width=1920, rule="square", machine="m")).to_dict("records")
     assert (row["tile"], row["lost by 16x16"]) == (8, 0.5)
+
+
+def test_two_scales_are_compared_with_the_better_tile_of_exact_lists():
+    table = pd.DataFrame(frames("playbot", load_scene("playbot"), "a100", {"1080p": (160, 96)}))
+    assert table.road.tolist() == list(ROADS)
+    pairs = table.set_index("road").pairs
+    assert pairs[TWO] < pairs[SMALL]
+    made = table.assign(ms=[5.0, 3.0, 4.0, 2.0, 1.0])
+    assert best_of_one(times(made, "1080p")).tolist() == [1.5]
 
 
 @pytest.mark.parametrize(("second", "clear"), [(1.05, False), (1.2, True)])

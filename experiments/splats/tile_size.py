@@ -41,7 +41,7 @@ def run(progress: Progress) -> Result:
     """Draw all of them."""
     import pandas as pd
 
-    scenes, missing = _scenes()
+    scenes, missing = scenes_here()
     rows: list[dict[str, Any]] = []
     for name, scene in scenes.items():
         for machine in MACHINES:
@@ -62,7 +62,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _scenes() -> tuple[dict[str, Scene], list[str]]:
+def scenes_here() -> tuple[dict[str, Scene], list[str]]:
     """Scenes that are here, and what is not."""
     found, missing = {}, []
     for name in SCENES:

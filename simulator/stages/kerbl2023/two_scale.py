@@ -158,7 +158,7 @@ def blend_batches(
     inputs = (starts, listed, projected, colours, BOUNDS[bound], macro, tiles, batch)
     segment = smallest_transaction_bytes(int(simt.coalescing))
     for_parts(_batches, parts_of(shape[0], _PART), *inputs, simt.warp, segment, partials, table)
-    return StageResult(partials, () if table is None else (_work(table, tiles, len(colours)),))
+    return StageResult(partials, () if table is None else (_work(table, tiles, len(colours), simt.warp),))
 
 
 def by_macro_tile(partials: Partials, works: tuple[Work, ...]) -> NDArray[np.int64]:
@@ -170,7 +170,7 @@ def by_macro_tile(partials: Partials, works: tuple[Work, ...]) -> NDArray[np.int
     return found
 
 
-def _work(table: NDArray[np.int64], tiles: Tiles, count: int) -> Work:
+def _work(table: NDArray[np.int64], tiles: Tiles, count: int, warp: int) -> Work:
     """Work of the kernel, from the rows of its batches."""
     entries, written = int(table[:, _E.ENTRIES].sum()), int(table[:, _E.PARTIAL_BYTES].sum())
     used = min(count, entries)
@@ -182,7 +182,7 @@ def _work(table: NDArray[np.int64], tiles: Tiles, count: int) -> Work:
         events=_E,
         table=table,
         grid=len(table),
-        block=WARPS * 32,
+        block=WARPS * warp,
         shared_bytes=SHARED_BYTES,
         variant=f"tile {tiles.tile_x}x{tiles.tile_y}",
         streams=(
