@@ -72,6 +72,23 @@ def test_an_opaque_pixel_differs_by_no_more_than_the_transmittance_that_lists_le
     assert (two["transmittance"] <= one["transmittance"] + ROUNDING).all()
 
 
+def test_a_pixel_that_grows_opaque_within_its_first_batch_is_the_same_to_the_bit():
+    made, tile = scene(CROWD, seed=8), 8
+    one, two = (run.frame.buffers for run in both(made, tile=tile, bound="ellipse"))
+    partials = batched(made, tile, BATCH)[0]
+    columns, same = -(-WIDTH // (8 * tile)), 0
+    for y in range(HEIGHT):
+        for x in range(WIDTH):
+            row, column = y // tile, x // tile
+            first = partials.firsts[row // 4 * columns + column // 8]
+            own = row % 4 * 8 + column % 8
+            if partials.masks[first] >> own & 1 and partials.values[first, own, y % tile * tile + x % tile, 3] < 0:
+                assert (one["colours"][y, x] == two["colours"][y, x]).all()
+                assert one["transmittance"][y, x] == two["transmittance"][y, x]
+                same += 1
+    assert same > 100
+
+
 @pytest.mark.parametrize("bound", ["square", "ellipse"])
 @pytest.mark.parametrize("tile", [8, 16])
 @pytest.mark.parametrize("made", [scene, odd_splats, faint], ids=["usual", "odd", "faint"])
