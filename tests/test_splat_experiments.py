@@ -8,7 +8,7 @@ from tilestamp.experiments.silicon.splat import fastest_tiles, kernel_names
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME
 from tilestamp.experiments.splats.host import host_ms
 from tilestamp.experiments.splats.tile_size import measured, winners
-from tilestamp.experiments.splats.two_scale import ROADS, SMALL, TWO, best_of_one, frames, times
+from tilestamp.experiments.splats.two_scale import ROADS, SMALL, TWO, best_of_one, by_lists_alone, frames, times
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.simulation import simulate
@@ -41,6 +41,8 @@ def test_two_scales_are_compared_with_the_better_tile_of_exact_lists():
     assert pairs[TWO] < pairs[SMALL]
     made = table.assign(ms=[5.0, 3.0, 4.0, 2.0, 1.0])
     assert best_of_one(times(made, "1080p")).tolist() == [1.5]
+    blended = made.assign(blend_ms=[3.0, 2.0, 1.5, 0.5, 0.5])
+    assert by_lists_alone(blended, "1080p").tolist() == [1.0]
 
 
 @pytest.mark.parametrize(("second", "clear"), [(1.05, False), (1.2, True)])
