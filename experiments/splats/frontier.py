@@ -203,7 +203,9 @@ def notes(table: "pd.DataFrame", chance: "pd.DataFrame") -> list[str]:
     return [answer, half, random, *_coarser(table), SURE]
 
 
-SURE = "Assumed: what sorting at a pixel costs (by hand from its statements); everything else is priced as on the H200."
+SURE = (
+    "Assumed: what sorting at a pixel and masks cost (by hand from their statements); all else is priced as measured."
+)
 
 
 def _coarser(table: "pd.DataFrame") -> list[str]:

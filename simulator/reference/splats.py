@@ -74,7 +74,7 @@ def stochastic(
     for _ in range(samples):
         there = np.flatnonzero(chance.random(len(found.alphas)) < found.alphas)
         _, nearest = np.unique(found.pixels[there], return_index=True)
-        kept = Fragments(*(part[there[nearest]] for part in found))
+        kept = taken(found, there[nearest])
         picture += _picture(kept, colours, np.ones(len(nearest)), width, height) / samples
     return picture
 
@@ -88,7 +88,12 @@ def in_order(splats: Splats, projected: Projected, camera: Pinhole, width: int, 
     ]
     whole = Fragments(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else NOTHING
     order = np.lexsort((whole.depths, whole.pixels))
-    return Fragments(*(part[order] for part in whole))
+    return taken(whole, order)
+
+
+def taken(found: Fragments, index: NDArray[np.int64]) -> Fragments:
+    """Some of the fragments."""
+    return Fragments(found.pixels[index], found.splats[index], found.alphas[index], found.depths[index])
 
 
 def _picture(
