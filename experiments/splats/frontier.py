@@ -36,6 +36,8 @@ from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tiles import tiles_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from numpy.typing import NDArray
 
@@ -203,7 +205,9 @@ def notes(table: "pd.DataFrame", chance: "pd.DataFrame") -> list[str]:
     return [answer, half, random, *_coarser(table), SURE]
 
 
-SURE = "Assumed: what sorting at a pixel costs (by hand from its statements); everything else is priced as on the H200."
+SURE = (
+    "Assumed: what sorting at a pixel and masks cost (by hand from their statements); all else is priced as measured."
+)
 
 
 def _coarser(table: "pd.DataFrame") -> list[str]:
@@ -225,8 +229,9 @@ def _missing(scenes: dict[str, Scene]) -> list[str]:
     return [f"levels of detail that are not on the scene search path: {', '.join(missing)}"] if missing else []
 
 
-def _draw(table: "pd.DataFrame", title: str, path: Path) -> None:
+def _draw(table: "pd.DataFrame", title: str, path: "Path") -> None:
+    kind = [rule.partition(", ")[2] or rule for rule in table["rule"]]
     panels(
-        table.assign(second=False), path, panel="level", group="rule", x="ms", y="rms", front="front", second="second",
-        x_label="modelled frame [ms]", y_label="error [steps of a byte, RMS]", title=title,
+        table.assign(second=False, kind=kind), path, panel="level", group="kind", x="ms", y="rms", front="front",
+        second="second", x_label="modelled frame [ms]", y_label="error [steps of a byte, RMS]", title=title,
     )  # fmt: skip

@@ -6,6 +6,7 @@ Modelled
   the exp of the GPU's special function unit: all arrays and the picture are those of an H200, to the bit.
 - Lists by the published square of three sigmas, by a box around the alpha cut-off, or by its ellipse (``bound``).
 - Two scales (``two_scale``): lists of macro tiles of 8x4 tiles, blended tile by tile in batches, as HiGS does.
+- A bit mask of pixels that are not done, by which a warp skips entries (``mask``).
 - Order at each pixel by a sorted window of registers, the simplest mode of StopThePop (``order``).
 - The blending loop of the backward pass, counted (``gradients``): nine atomics a pixel and Gaussian, or a warp.
 - Every kernel's launch; in the blending loop trips, steps that blend, rounds, and the warp that its block waits for.

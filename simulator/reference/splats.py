@@ -74,7 +74,7 @@ def stochastic(
     for _ in range(samples):
         there = np.flatnonzero(chance.random(len(found.alphas)) < found.alphas)
         _, nearest = np.unique(found.pixels[there], return_index=True)
-        kept = Fragments._make(part[there[nearest]] for part in found)
+        kept = taken(found, there[nearest])
         picture += _picture(kept, colours, np.ones(len(nearest)), width, height) / samples
     return picture
 
@@ -86,9 +86,14 @@ def in_order(splats: Splats, projected: Projected, camera: Pinhole, width: int, 
         fragments(int(i), projected, rows[i], centres[i], camera, width, height)
         for i in np.flatnonzero(projected.radii)
     ]
-    whole = Fragments._make(map(np.concatenate, zip(*found, strict=True))) if found else NOTHING
+    whole = Fragments(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else NOTHING
     order = np.lexsort((whole.depths, whole.pixels))
-    return Fragments._make(part[order] for part in whole)
+    return taken(whole, order)
+
+
+def taken(found: Fragments, index: NDArray[np.int64]) -> Fragments:
+    """Some of the fragments."""
+    return Fragments(found.pixels[index], found.splats[index], found.alphas[index], found.depths[index])
 
 
 def _picture(
