@@ -93,6 +93,8 @@ def test_another_type_is_one_sentence(given, sentence):
 @pytest.mark.parametrize("pipeline", pipeline_names())
 @pytest.mark.parametrize("target", [(0, -40, 2), (40, -20, 2)], ids=["behind the eye", "beside the view"])
 def test_a_picture_of_nothing_says_so(pipeline, target, picture):
+    if pipeline == "nonlinear" and target[0]:
+        pytest.skip("a fisheye sees what lies beside a perspective view")
     camera = LookAt((0, -20, 2), target, (0, 0, 1))
     run = draw(
         load_scene(scene_for(pipeline)), pipeline, MACHINES.get(pipeline, "gtx480"), camera=camera, picture=picture
@@ -105,7 +107,7 @@ def test_a_picture_of_something_does_not(pipeline):
     assert NOTHING not in draw(scene_for(pipeline), pipeline, MACHINES.get(pipeline, "gtx480")).frame.remarks
 
 
-@pytest.mark.parametrize("pipeline", sorted({*pipeline_names()} - {"micropolygon", "splat"}))
+@pytest.mark.parametrize("pipeline", sorted({*pipeline_names()} - {"micropolygon", "splat", "nonlinear"}))
 @pytest.mark.parametrize("corners", [[(0, 0)] * 3, [(-0.5, -0.5), (0, 0), (0.5, 0.5)]], ids=["a point", "a line"])
 def test_triangles_without_area_show_nothing(pipeline, corners):
     run = draw(triangle(*corners), pipeline, MACHINES.get(pipeline, "gtx480"), camera=EYE)
