@@ -158,6 +158,7 @@ GENERATED_FRAMES = (
     Frame("binned", SOUP, "ga104", {"fragment_depth": "stepped"}),
     Frame("splat", "odd splats", "h200", {}),
     Frame("splat", "odd splats", "h200", {"bound": "ellipse", "tile": 8}),
+    Frame("splat", "odd splats", "h200", {"bound": "ellipse", "tile": 8, "two_scale": True}),
     Frame("binned", SOUP, "h200", {"order": "oit", "texture_filter": "bilinear", "cull_backfaces": False}),
     Frame("binned", SOUP, "h200", {}),  # magnified textures
     *(Frame("binned", SOUP, machine, {"derivatives": "planes"}) for machine in ("ga104", "h200")),
