@@ -61,7 +61,25 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("gtx480", {"mode": "color", "cull_backfaces": False, "first_frame": True}),
         ("h200", {"release": "nvdiffrast"}),
         ("h200", {"release": "nvdiffrast", "copy_parameters": True}),
+        *(
+            (machine, {"mode": "blend", "blend": blend})
+            for machine in ("gtx480", "h200")
+            for blend in ("over", "additive", "max", "multiply", "nearest", "k-buffer", "stochastic")
+        ),
+        *(
+            (machine, {"mode": "blend", "lists": lists})
+            for machine in ("gtx480", "h200")
+            for lists in ("linked", "round", "chunked", "fixed")
+        ),
+        ("gtx480", {"mode": "blend", "lists": "fixed", "room": 1}),
+        *((machine, {"mode": "blend", "blend": "tests.ledger.scenes:BRIGHTEST"}) for machine in ("gtx480", "h200")),
     ),
+    "nonlinear": (
+        ("h200", {"double": False}),
+        ("h200", {"method": "tessellated"}),
+        ("h200", {"method": "tessellated", "double": False}),
+    ),
+    "stochastic": (("h200", {"double": True}), ("h200", {"double": True, "bounds": "whole"})),
     "freepipe": (("h200", {"early": True}),),
     "stamps": (("gtx280", {"stamp": 4, "touch": "polygon", "spp": 4}), ("h200", {"coarse": 16, "triangles": True})),
     "tiled": (
@@ -81,6 +99,8 @@ VARIANTS: dict[str, tuple[tuple[str, dict[str, Any]], ...]] = {
         ("h200", {"bound": "ellipse", "tile": 8}),
         ("h200", {"threads": 64}),
         ("h200", {"key": 32}),
+        ("h200", {"order": "pixel"}),
+        *(("h200", {"mask": True, "tile": tile}) for tile in (4, 8, "16x8", 16, 32)),
         ("h200", {"gradients": "lanes"}),
         ("h200", {"gradients": "reduced"}),
     ),
@@ -201,13 +221,18 @@ def event_kinds(pipeline: str) -> set[str]:
 
 
 def silent_events(pipeline: str) -> set[str]:
-    """Events of the pipeline's stages that are zero in all its frames, whichever kernel of the stage counts them."""
+    """Events that are zero in all frames of a pipeline, in their stage and in all that count by the same enum."""
     totals: dict[str, int] = {}
     for work in _works(pipeline):
         for name, count in work.counts().items():
-            event = f"{work.stage}.{name}"
-            totals[event] = totals.get(event, 0) + count
-    return {event for event, total in totals.items() if not total}
+            for kind in (f"{work.stage}.{name}", f"{work.events.__name__} {name}"):
+                totals[kind] = totals.get(kind, 0) + count
+    return {
+        f"{work.stage}.{name}"
+        for work in _works(pipeline)
+        for name in work.counts()
+        if not totals[f"{work.stage}.{name}"] and not totals[f"{work.events.__name__} {name}"]
+    }
 
 
 def entries(pipeline: str) -> dict[tuple[str, str, str], str]:
@@ -289,6 +314,7 @@ def _times(timing: Any) -> dict[str, Any]:
 
 UNREACHED = {  # prices that no frame of a pipeline pays: why
     "address_calculation: 2x2 slots aggregated": "only ``validate`` runs this variant",
+    "pixelShader": "of ``simulator.nvdiffrast.rasterize(cost=)``, which is no pipeline",
 }
 
 
@@ -321,4 +347,10 @@ def _paid(mix: Mix, run: Run) -> Iterator[tuple[str, str, str]]:
         if isinstance(work, Work):
             variant = f"{work.kernel}: {work.variant}"
             kernel = variant if variant in mix.kernels else work.kernel
-            yield from ((mix.name, kernel, event) for event, count in work.counts().items() if count)
+            for event, count in work.counts().items():
+                if count:
+                    yield mix.name, kernel, event
+                    if kernel in mix.kernels and mix.kernels[kernel].prices.get(event) is _of_all_variants(
+                        mix, kernel, event
+                    ):
+                        yield mix.name, work.kernel, event

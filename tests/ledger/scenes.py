@@ -14,6 +14,7 @@ from tilestamp.simulator.scenes.pinhole import PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.splat_view import perspective
 from tilestamp.simulator.scenes.splats import make_splats
+from tilestamp.simulator.stages.laine2011.blend_programs import BlendProgram
 
 IN_THE_MIDDLE = LookAt((0.0, 0.0, 1.5), (0.0, 0.0, 0.0), fov_degrees=60.0, near=0.2, far=3.0)
 
@@ -109,3 +110,11 @@ def patches_at_the_eye() -> Scene:
 
 MADE = (textured_soup(), crowds(), cut_into_six(), patches_at_the_eye(), odd_splats())
 GENERATED = {scene.name: scene for scene in MADE}
+
+
+def brightest(pixel, color, _depth, _key):
+    """A program for cudaraster's ROP: the larger of two packed colours."""
+    pixel[0] = max(pixel[0], color)
+
+
+BRIGHTEST = BlendProgram(brightest, operations=dict.fromkeys(("fp32", "int32", "mul32", "sfu", "control", "shared"), 1))
