@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tilestamp.simulator.nvdiffrast import texture
-from tilestamp.simulator.nvdiffrast.draw import _through_viewport, _viewports
+from tilestamp.simulator.nvdiffrast.draw import through_viewport, viewports
 from tilestamp.simulator.stages.laine2011.exact import fma
 
 HALF = np.float32(0.5)
@@ -85,14 +85,14 @@ def test_the_level_of_a_cube_map_is_that_of_the_step_on_its_face(direction):
     ("pixels", "sizes"), [(2048, [2048]), (2049, [1032, 1017]), (4097, [1368, 1368, 1361]), (5000, [1672, 1672, 1656])]
 )
 def test_viewports_are_of_whole_tiles_and_the_last_is_shorter(pixels, sizes):
-    found = list(_viewports(pixels))
+    found = list(viewports(pixels))
     assert [size for _, size in found] == sizes
     assert [first for first, _ in found] == [0, *np.cumsum(sizes[:-1]).tolist()]
 
 
 def test_every_bit_of_a_position_through_a_viewport():
     pos = np.random.default_rng(5).uniform(-2, 2, (50, 4)).astype(np.float32)
-    moved = _through_viewport(pos, (4097, 3000), (2736, 1504), (1361, 1496))
+    moved = through_viewport(pos, (4097, 3000), (2736, 1504), (1361, 1496))
     for (x, y, z, w), out in zip(pos, moved, strict=True):
         scale_x, scale_y = np.float32(4097) / np.float32(1361), np.float32(3000) / np.float32(1496)
         shift_x = np.float32(4097 - 1361 - 2 * 2736) / np.float32(1361)

@@ -17,7 +17,7 @@ from tilestamp.simulator.stages.eisenacher2010.dice import dice
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent, dice_work
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GRID_SIDES
 from tilestamp.simulator.stages.eisenacher2010.link_grids import NEIGHBOURS, LinkEvent, link_grids
-from tilestamp.simulator.stages.eisenacher2010.shade_visible import PixelEvent, _pixel_work
+from tilestamp.simulator.stages.eisenacher2010.shade_visible import PixelEvent, pixel_work
 from tilestamp.simulator.stages.eisenacher2010.shared_vertices import SharedVertexEvent, dice_shared, own_vertices
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND as BACKGROUND_ID
@@ -192,7 +192,7 @@ def test_blending_loads_the_four_vertices_of_each_quad_and_marking_stores_a_word
     seen = ids != BACKGROUND_ID
     warps = np.split(ids.reshape(-1), range(32, ids.size, 32))
     for offsets, size, bytes_a_record in (([0, 1, 4, 5], 16, 1), ([0], 4, 16)):
-        work = _pixel_work("kernel", ids, 4, np.array(offsets), 200, H200)
+        work = pixel_work("kernel", ids, 4, np.array(offsets), 200, H200)
         sectors = sum(
             len({(int(i) + o) // bytes_a_record * size // 32 for i in warp[warp != BACKGROUND_ID]})
             for warp in warps

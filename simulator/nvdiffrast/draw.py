@@ -64,21 +64,21 @@ def draw(
     -------
     Layer
     """
-    columns, rows = list(_viewports(width)), list(_viewports(height))
+    columns, rows = list(viewports(width)), list(viewports(height))
     if len(columns) == len(rows) == 1:
         return _draw_viewport(positions, triangles, height, width, clip, behind, execute, simt)
     layer = Layer(np.full((height, width), -1, np.int32), np.full((height, width), DEPTH_MAX, np.uint32))
     for y, tile_height in rows:
         for x, tile_width in columns:
             tile = np.s_[y : y + tile_height, x : x + tile_width]
-            moved = _through_viewport(positions, (width, height), (x, y), (tile_width, tile_height))
+            moved = through_viewport(positions, (width, height), (x, y), (tile_width, tile_height))
             before = None if behind is None else behind[tile]
             shown = _draw_viewport(moved, triangles, tile_height, tile_width, clip, before, execute, simt)
             layer.ids[tile], layer.depths[tile] = shown
     return layer
 
 
-def _viewports(pixels: int) -> Iterator[tuple[int, int]]:
+def viewports(pixels: int) -> Iterator[tuple[int, int]]:
     """First pixel and size of the viewports along an axis: as few as hold 2048, of whole tiles, the last shorter."""
     whole = _whole_tiles(pixels)
     size = _whole_tiles(-(-whole // -(-whole // MAX_SIZE)))
@@ -99,7 +99,7 @@ def _move_part(part: int, parts: int, positions: Any, scales: Any, shifts: Any, 
         out[v, 2], out[v, 3] = positions[v, 2], w
 
 
-def _through_viewport(
+def through_viewport(
     positions: NDArray[np.float32], whole: tuple[int, int], first: tuple[int, int], size: tuple[int, int]
 ) -> NDArray[np.float32]:
     """Clip positions as a viewport of ``size`` pixels at pixel ``first`` of the ``whole`` sees them."""

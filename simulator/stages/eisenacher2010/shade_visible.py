@@ -170,14 +170,14 @@ def shade_visible(
     shape, colors = block_shape(8, 1, simt, box_tests=True, loaded=False, grid=side), vertices.view(np.uint32)[:, :, 3]
     for_parts(_blend, parts_of(height), ids, vertices, colors, shape, side**2, image)
     works = (
-        _pixel_work("mark_grids", ids, side, np.array([0]), len(marks), simt),
+        pixel_work("mark_grids", ids, side, np.array([0]), len(marks), simt),
         *_renamed(scan),
         thread_per_item(
             STAGE, "list_grids", len(marks), BLOCK, simt,
             (Access("marks", WORD_BYTES, 1), Access("places", WORD_BYTES, 1)), (Access("seen grids", WORD_BYTES, 1),),
         ),
         *(_colors_alone(work) for work in dicing),
-        _pixel_work("blend_pixels", ids, side, np.array([0, 1, side, side + 1]), len(marks), simt),
+        pixel_work("blend_pixels", ids, side, np.array([0, 1, side, side + 1]), len(marks), simt),
     )  # fmt: skip
     return StageResult(image, works, {"shaded_vertices": len(kept) * side**2})
 
@@ -204,7 +204,7 @@ def _colors_alone(work: Work) -> Work:
     return replace(work, stage=STAGE, variant="colours", streams=streams)
 
 
-def _pixel_work(
+def pixel_work(
     name: str, ids: NDArray[np.uint32], side: int, offsets: NDArray[np.int64], grids: int, simt: Simt
 ) -> Work:
     """Work of a kernel with a thread a pixel."""

@@ -39,14 +39,14 @@ class Windows(NamedTuple):
 
 
 @kernel(lent=True)
-def depth_along(row: Any, x: int, y: int, tiles: Tiles, rays: Rays) -> Any:
+def depth_along(ray: Any, x: int, y: int, tiles: Tiles, rays: Rays) -> Any:
     """Depth at which a Gaussian is densest along the ray of a pixel."""
     dx = (np.float32(2 * x + 1) / np.float32(tiles.width) - _ONE) * rays.tan_x
     dy = (np.float32(2 * y + 1) / np.float32(tiles.height) - _ONE) * rays.tan_y
     above, below = np.float32(0), np.float32(0)
     for k in range(3):
-        u = fma(row[3 * k], dx, fma(row[3 * k + 1], dy, row[3 * k + 2]))
-        above, below = fma(u, row[9 + k], above), fma(u, u, below)
+        u = fma(ray[3 * k], dx, fma(ray[3 * k + 1], dy, ray[3 * k + 2]))
+        above, below = fma(u, ray[9 + k], above), fma(u, u, below)
     return above / below
 
 
