@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.silicon.splat_inputs import PIPELINE, Measured, measured_scenes, read_measured
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME, by_kernel, entry, sentences
+from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import host_ms
 from tilestamp.experiments.validation.quantities import QUANTITIES, SHORTEST_US, TIME
 from tilestamp.models.launch import Launch
@@ -20,7 +21,6 @@ from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
 from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
-from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,8 +91,8 @@ def compared(measured: Measured) -> Iterator[dict[str, Any]]:
 
 def draw(measured: Measured) -> Run:
     """Draw one configuration."""
-    return simulate(
-        measured.scene, "splat", "h200", width=measured.width, height=measured.height, camera=measured.camera,
+    return executed(
+        measured.scene, "h200", measured.label, width=measured.width, height=measured.height, camera=measured.camera,
         **measured.options,
     )  # fmt: skip
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import load_scene
-from tilestamp.simulator.simulation import simulate
 
 QUESTION = "How many frames a second does gsplat's garden take on a TITAN RTX and on an MI300X?"
 SLOW = True  # 2.8 million Gaussians
@@ -37,7 +37,7 @@ def run(progress: Progress) -> Result:
             scene = load_scene(f"garden{grid}")
         except TilestampError as missing:
             return Result(name="splats-profile", title=TITLE, source=SOURCE, cells=[], warnings=[str(missing)])
-        frame = simulate(scene, "splat", machine, width=WIDTH, height=HEIGHT, picture=False)
+        frame = executed(scene, machine, width=WIDTH, height=HEIGHT, picture=False)
         milliseconds = frame_ms(frame)
         stages = ", ".join(f"{name} {ms:.2f}" for name, ms in frame.stages.milliseconds.items())
         notes.append(f"garden{grid} on {machine}: {milliseconds:.2f} ms: {stages}; the host {_host(frame):.2f}.")

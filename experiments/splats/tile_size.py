@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.silicon.splat_inputs import MEASURED, PIPELINE, TIMED
+from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,9 +80,7 @@ def frames(name: str, scene: Scene, machine: str) -> Iterator[dict[str, Any]]:
     for width, height in SCREENS if machine == MEASURED_ON else SCREENS[:1]:
         for rule in RULES:
             for tile in TILES:
-                frame = simulate(
-                    scene, "splat", machine, width=width, height=height, tile=tile, bound=rule, picture=False
-                )
+                frame = executed(scene, machine, width=width, height=height, tile=tile, bound=rule, picture=False)
                 counts = frame.counts
                 yield {
                     "scene": name, "machine": machine, "width": width, "rule": rule, "tile": tile,

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
 from tilestamp.experiments.splats.tile_size import SCENES, scenes_here
 from tilestamp.simulator.scenes.scene import Scene
-from tilestamp.simulator.simulation import simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,7 @@ def frames(
     """Milliseconds of each frame of one scene on one GPU."""
     for screen, (width, height) in screens.items():
         for road, options in ROADS.items():
-            run = simulate(scene, "splat", machine, width=width, height=height, picture=False, **options)
+            run = executed(scene, machine, width=width, height=height, picture=False, **options)
             stages = run.stages.milliseconds
             yield {
                 "scene": name, "machine": machine, "screen": screen, "road": road, "ms": frame_ms(run),
