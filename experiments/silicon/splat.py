@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
-from tilestamp.experiments.silicon.splat_inputs import PIPELINE, Measured, measured_scenes, read_measured
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
+from tilestamp.experiments.silicon.splat_inputs import MEASURED, PIPELINE, Measured, measured_scenes, read_measured
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME, by_kernel, entry, sentences
 from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import host_ms
@@ -65,6 +65,8 @@ def run(progress: Callable[[str], None]) -> Result:
 
 
 TITLE = "H200, Gaussian splats, model against machine"
+MADE_FROM = {path.name.removesuffix("_scene.json") for path in MEASURED.glob("*_scene.json")}
+"""Scenes from whose counters the mix was made: that its instructions are theirs is no prediction."""
 
 
 def compared(measured: Measured) -> Iterator[dict[str, Any]]:
@@ -139,7 +141,10 @@ def _cell(row: dict[str, Any]) -> Cell:
     """A row of the table as a cell."""
     unit = "us" if row["quantity"] in {TIME, FRAME_TIME} else ""
     frame, column = f"{row['scene']} {row['config']}", f"{row['kernel']} {row['quantity']}"
-    return Cell(frame, column, unit, published=row["measured"], ours=row["ours"], aim=row["aim"], frame=frame)
+    status: Status = "reproduced" if row["quantity"] == "instructions" and row["scene"] in MADE_FROM else "predicted"
+    return Cell(
+        frame, column, unit, published=row["measured"], ours=row["ours"], aim=row["aim"], frame=frame, status=status
+    )
 
 
 def _frames(table: "pd.DataFrame") -> Iterator[tuple[Any, "pd.DataFrame"]]:
