@@ -112,7 +112,7 @@ def _ratios(table: "pd.DataFrame") -> "pd.DataFrame":
     """Tests and times over those without culling."""
     keys = ["scene", "what", "machine"]
     plain = table[table.cull == "none"].set_index(keys)
-    joined = table.join(plain[["tests", "raster_ms", "ms"]], on=keys, rsuffix="_none")
+    joined = table.join(plain[["tests", "raster_ms", "ms"]].add_suffix("_none"), on=keys)
     for column in ("tests", "raster_ms", "ms"):
         joined[f"{column}_ratio"] = joined[column] / joined[f"{column}_none"]
     return joined
