@@ -82,7 +82,7 @@ def test_no_vertex_and_no_sample_leaves_its_bound(seed, height, bound, distance)
     on_screen = (plain.boxes[:, :2] < SIZE).all(axis=1) & (plain.boxes[:, 2:] > 0).all(axis=1)
     moved = np.abs(grids.vertices[on_screen, :, :2] - plain.vertices[on_screen, :, :2])
     assert moved.max(initial=0) <= room.room + 1e-3
-    assert (grids.boxes[:, 2:] - grids.boxes[:, :2]).max(initial=0) <= bound
+    assert (grids.boxes[:, 2:] - grids.boxes[:, :2]).max(initial=0) <= bound * (1 + 1e-5)  # float32 corners
     own, wide = (hits(grids, screen_tiles(*SIZE, 4, size)) for size in (bound, 500.0))
     assert np.array_equal(own, wide)
 

@@ -9,8 +9,10 @@ from tests import naive_cudaraster as naive
 from tests.tile_lists import box_lists
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.laine2011.coverage import centroid_sample, pixel_mask, sample_mask, square_mask
-from tilestamp.simulator.stages.laine2011.fine_raster import FineRasterEvent, clear_depth_value, fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster import fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over
+from tilestamp.simulator.stages.laine2011.frame_buffers import clear_depth_value
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 

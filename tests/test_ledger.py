@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import pytest
 
-from tests.ledger import book, cells, frames
+from tests.ledger import book, cells, runs
 from tilestamp.simulator import stages
 from tilestamp.simulator.pipelines import pipeline_names
 
@@ -16,7 +16,7 @@ SHOWN = 30
 
 @pytest.mark.parametrize("pipeline", pipeline_names())
 def test_counts_and_prices_of_small_frames_are_those_of_the_ledger(pipeline):
-    found = book.differences(book.read(book.FOLDER / "frames" / f"{pipeline}.csv"), frames.entries(pipeline))
+    found = book.differences(book.read(book.FOLDER / "frames" / f"{pipeline}.csv"), runs.entries(pipeline))
     assert not found, "\n".join([f"{len(found)} numbers differ", *found[:SHOWN], HINT])
 
 
@@ -38,11 +38,11 @@ def test_cells_of_experiments_are_those_of_the_ledger(name):
 @pytest.mark.parametrize("pipeline", pipeline_names())
 def test_every_event_of_a_pipeline_occurs_in_the_ledger(pipeline):
     """Else no frame of the ledger would tell of a change in it."""
-    assert frames.silent_events(pipeline) == set()
+    assert runs.silent_events(pipeline) == set()
 
 
 def test_every_stage_is_run_in_the_ledger():
-    run = {kind for pipeline in pipeline_names() for kind in frames.event_kinds(pipeline)}
+    run = {kind for pipeline in pipeline_names() for kind in runs.event_kinds(pipeline)}
     assert _event_kinds() - run == set()
 
 
@@ -74,4 +74,4 @@ def test_what_is_missing_or_new_is_seen():
 @pytest.mark.parametrize("pipeline", pipeline_names())
 def test_every_price_of_a_pipeline_is_paid_in_the_ledger(pipeline):
     """Else no frame of the ledger would tell of a change in it."""
-    assert frames.unpaid(pipeline) == []
+    assert runs.unpaid(pipeline) == []

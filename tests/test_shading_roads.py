@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from tests.roads import check_in_small
 from tilestamp.experiments.exploration import compaction, decoupled, derivatives, quad_merging
-from tilestamp.experiments.harness.write import draw_figure
 from tilestamp.experiments.stability import merged_quads
 
 SMALL = {
@@ -26,21 +26,9 @@ SMALL = {
 }
 
 
-@pytest.fixture(params=SMALL, ids=lambda module: module.__name__.rpartition(".")[2])
-def small(request, monkeypatch):
-    """A road in small."""
-    for name, value in SMALL[request.param].items():
-        monkeypatch.setattr(request.param, name, value)
-    return request.param
-
-
-def test_a_road_has_cells_sentences_and_pictures(small, tmp_path):
-    result = small.run(lambda _: None)
-    assert result.cells
-    assert result.answer
-    assert all(note.endswith(".") for note in result.notes)
-    for figure in result.figures:
-        draw_figure(figure, result, tmp_path / figure.name)
+@pytest.mark.parametrize("road", SMALL, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_a_road_has_cells_sentences_and_pictures(road, monkeypatch, tmp_path):
+    check_in_small(road, SMALL[road], monkeypatch, tmp_path)
 
 
 @pytest.mark.parametrize(("spp", "aim"), [(4, 0.17), (16, 0.15)])

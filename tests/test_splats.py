@@ -9,14 +9,12 @@ from tests import naive_splats as naive
 from tests.ledger.scenes import odd_splats
 from tilestamp import TilestampError, simulate
 from tilestamp.models.kernel import kernel
-from tilestamp.models.simt import Simt
 from tilestamp.simulator.scenes.pinhole import Pinhole, PinholeCamera
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.splat_view import perspective
 from tilestamp.simulator.stages.kerbl2023.blend_step import blend_step
-from tilestamp.simulator.stages.kerbl2023.duplicate import Pairs, keys_of
+from tilestamp.simulator.stages.kerbl2023.duplicate import keys_of
 from tilestamp.simulator.stages.kerbl2023.exponential import exp32
-from tilestamp.simulator.stages.kerbl2023.sort import sort
 from tilestamp.simulator.stages.kerbl2023.tiles import to_int
 
 WIDTH, HEIGHT = 75, 50
@@ -177,30 +175,6 @@ def test_atomics_of_a_warp_that_adds_up_first_take_less_time():
     assert reduced < lanes
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.integers(0, 2**45 - 1), max_size=200), st.integers(33, 48))
-def test_the_sort_is_stable_by_the_lowest_bits(keys, bits):
-    values = np.arange(len(keys), dtype=np.uint32)
-    low = np.array(keys, np.uint64) & np.uint64(2**bits - 1)
-    pairs = sort(Pairs(low.copy(), values.copy()), bits, Simt()).outputs
-    assert pairs.values.tolist() == sorted(range(len(keys)), key=lambda i: low[i])
-    assert (pairs.keys == low[pairs.values]).all()
-
-
-def test_a_pass_counts_the_runs_of_each_block():
-    keys = np.arange(5760 * 2, dtype=np.uint64)[::-1].copy()
-    works = sort(Pairs(keys, np.zeros(len(keys), np.uint32)), 16, Simt()).works
-    passes = [work.counts() for work in works if work.kernel == "sort_onesweep"]
-    assert [one["DIGITS"] for one in passes] == [512, 90]  # two blocks with all digits
-    assert [one["DIGITS_USED"] for one in passes] == [256, 45]
-    assert [one["PAIRS"] for one in passes] == [len(keys)] * 2
-
-
-@pytest.mark.parametrize(("tiles", "bits"), [(8160, 45), (2170, 44), (129600, 49), (1, 33), (1024, 43)])
-def test_keys_have_the_bits_of_depth_and_of_the_number_of_tiles(tiles, bits):
-    assert keys_of(tiles).sorted_bits == bits
-
-
 def test_keys_of_32_bits_take_four_passes_and_order_what_lies_far_enough_apart():
     short, long = draw(key=32), draw(key=64)
     assert [sum(work.kernel == "sort_onesweep" for work in run.frame.works) for run in (short, long)] == [4, 5]
@@ -212,11 +186,6 @@ def test_keys_of_32_bits_take_four_passes_and_order_what_lies_far_enough_apart()
     step = np.float32(4.0) * 2.0 ** (23 - bits + 8 - 23)  # of depths under 4: a float's bits but the lowest
     for ours in lists.values():
         assert (np.diff(depths[ours]) > -step).all()
-
-
-def test_more_tiles_than_a_key_can_count_are_refused():
-    with pytest.raises(TilestampError, match="leave no bit of 32 for the depth"):
-        keys_of(2**31, 4)
 
 
 @settings(max_examples=200, deadline=None)

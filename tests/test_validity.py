@@ -144,3 +144,9 @@ def test_the_manifest_names_stand_ins_and_the_files_that_were_looked_for(tmp_pat
     manifest = json.loads((tmp_path / "eisenacher2010-table1" / "manifest.json").read_text())
     assert manifest[FILES] == {"bigguy": "missing"}
     assert manifest["stand-ins"] == {"bigguy": "bigguy.bpt"}
+
+
+def test_a_result_does_not_depend_on_results_that_lie_in_the_folder_of_reports():
+    """They lie there by default: each one written would make those before it out of date."""
+    beside = [path for path in validity.decisive(NAME) if path.relative_to(validity.ROOT).parts[0] == "reports"]
+    assert {path.suffix for path in beside} == {".py"}

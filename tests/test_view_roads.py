@@ -2,8 +2,8 @@
 
 import pytest
 
+from tests.roads import check_in_small
 from tilestamp.experiments.exploration import nonlinear, stochastic
-from tilestamp.experiments.harness.write import draw_figure
 
 SMALL = {
     stochastic: {
@@ -13,21 +13,9 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.fixture(params=SMALL, ids=lambda module: module.__name__.rpartition(".")[2])
-def small(request, monkeypatch):
-    """A road in small."""
-    for name, value in SMALL[request.param].items():
-        monkeypatch.setattr(request.param, name, value)
-    return request.param
-
-
-def test_a_road_has_cells_sentences_and_pictures(small, tmp_path):
-    result = small.run(lambda _: None)
-    assert result.cells
-    assert result.answer
-    assert all(note.endswith(".") for note in result.notes)
-    for figure in result.figures:
-        draw_figure(figure, result, tmp_path / figure.name)
+@pytest.mark.parametrize("road", SMALL, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_a_road_has_cells_sentences_and_pictures(road, monkeypatch, tmp_path):
+    check_in_small(road, SMALL[road], monkeypatch, tmp_path)
 
 
 def test_tiles_pay_for_large_polygons_and_not_for_small_ones():

@@ -55,13 +55,21 @@ def _versions() -> dict[str, str]:
 @cache
 def code_digest(experiment: str) -> str:
     """Digest of the files that decide what an experiment gives, 16 hexadecimal digits."""
-    module = f"tilestamp.experiments.{experiment.replace('/', '.')}"
-    files = {path for path in reached(module, *ALWAYS) if path.relative_to(ROOT).parts[0] not in FLOORS}
-    data = {path for folder in {file.parent for file in files} for path in _data(folder)}
     digest = hashlib.sha256(_floors().encode())
-    for path in sorted(files | data):
+    for path in sorted(decisive(experiment)):
         digest.update(_of_file(path))
     return digest.hexdigest()[:DIGITS]
+
+
+def decisive(experiment: str) -> set[Path]:
+    """Modules above the simulator that an experiment reaches, and the data beside those of the experiments.
+
+    What lies beside the modules of ``reports`` are pictures and, by default, the results themselves.
+    """
+    module = f"tilestamp.experiments.{experiment.replace('/', '.')}"
+    files = {path for path in reached(module, *ALWAYS) if path.relative_to(ROOT).parts[0] not in FLOORS}
+    folders = {file.parent for file in files if file.relative_to(ROOT).parts[0] == "experiments"}
+    return files | {path for folder in folders for path in _data(folder)}
 
 
 @cache

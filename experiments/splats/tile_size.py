@@ -4,7 +4,7 @@ Modelled frames of all GPUs; beside those of the H200 what was measured there (`
 level of playbot are looked for on the scene search path; where they are not, the embedded level of playbot is drawn.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,11 +42,7 @@ def run(progress: Progress) -> Result:
     import pandas as pd
 
     scenes, missing = scenes_here()
-    rows: list[dict[str, Any]] = []
-    for name, scene in scenes.items():
-        for machine in MACHINES:
-            progress(f"{name} on {machine}")
-            rows += frames(name, scene, machine)
+    rows = on_each(scenes, MACHINES, frames, progress)
     table = pd.DataFrame(rows).merge(measured(), how="left", on=["scene", "machine", "width", "rule", "tile"])
     best = winners(table)
     return Result(
@@ -60,6 +56,21 @@ def run(progress: Progress) -> Result:
         warnings=missing,
         tables={"frames": table, "fastest": best},
     )
+
+
+def on_each(
+    scenes: dict[str, Scene],
+    machines: Iterable[str],
+    frames: Callable[[str, Scene, str], Iterable[dict[str, Any]]],
+    progress: Progress,
+) -> list[dict[str, Any]]:
+    """Rows of the frames of all scenes on all machines."""
+    rows: list[dict[str, Any]] = []
+    for name, scene in scenes.items():
+        for machine in machines:
+            progress(f"{name} on {machine}")
+            rows += frames(name, scene, machine)
+    return rows
 
 
 def scenes_here() -> tuple[dict[str, Scene], list[str]]:

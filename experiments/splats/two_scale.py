@@ -12,7 +12,7 @@ from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
-from tilestamp.experiments.splats.tile_size import SCENES, scenes_here
+from tilestamp.experiments.splats.tile_size import SCENES, on_each, scenes_here
 from tilestamp.simulator.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -44,11 +44,7 @@ def run(progress: Progress) -> Result:
     import pandas as pd
 
     scenes, missing = scenes_here()
-    rows: list[dict[str, Any]] = []
-    for name, scene in scenes.items():
-        for machine in MACHINES:
-            progress(f"{name} on {machine}")
-            rows += frames(name, scene, machine)
+    rows = on_each(scenes, MACHINES, frames, progress)
     table = pd.DataFrame(rows)
     return Result(
         name="splats-two_scale",

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.work import Work

@@ -7,8 +7,8 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
 from tilestamp.simulator.stages.laine2011.fragment_lists import LAYOUTS, keep_fragments
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.programmable_rop import needs_depth, programmable_rop
 from tilestamp.simulator.stages.laine2011.resolve_lists import resolve_lists
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup

@@ -52,7 +52,8 @@ from tilestamp.simulator.stages.laine2011.alpha_test import alpha_test
 from tilestamp.simulator.stages.laine2011.blend_programs import BUILT_IN, find_program
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.coverage import TILE, shown_sample
-from tilestamp.simulator.stages.laine2011.fine_raster import MODES, FrameBuffers, Mode, fine_raster
+from tilestamp.simulator.stages.laine2011.fine_raster import MODES, Mode, fine_raster
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.parameter_copy import COPYING, with_parameter_copy
 from tilestamp.simulator.stages.laine2011.triangle_setup import (
     MAX_SUBTRIANGLES,

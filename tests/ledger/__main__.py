@@ -7,7 +7,7 @@ import os
 import sys
 
 from tests.conftest import SCENES_VARIABLE, real_scenes
-from tests.ledger import book, cells, frames
+from tests.ledger import book, cells, runs
 from tilestamp.simulator.pipelines import pipeline_names
 
 
@@ -15,7 +15,7 @@ def main() -> None:
     """Write files anew, and say what changed."""
     if "--cells" not in sys.argv[1:]:
         for pipeline in pipeline_names():
-            _renew("frames", pipeline, ("frame", "kernel", "quantity", "value"), frames.entries(pipeline))
+            _renew("frames", pipeline, ("frame", "kernel", "quantity", "value"), runs.entries(pipeline))
         return
     if real_scenes():
         os.environ.setdefault(SCENES_VARIABLE, real_scenes())

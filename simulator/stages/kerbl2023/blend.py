@@ -26,7 +26,7 @@ from tilestamp.simulator.stages.kerbl2023.blend_block import (
     count_rounds,
     gather_sectors,
 )
-from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, PLANES, Pixels, place, store
+from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, PLANES, Pixels, new_pixels, place, store
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
     ENTRY,
     ENTRY_RED,
@@ -191,13 +191,7 @@ def blend(
     outputs : Pixels
     works : one, a row a tile
     """
-    shape = (tiles.height, tiles.width)
-    pixels = Pixels(
-        np.empty((*shape, 3), np.float32),
-        np.empty(shape, np.float32),
-        np.empty(shape, np.uint32),
-        np.zeros((len(listed) if counting else 0, 2), np.int32),
-    )
+    pixels = new_pixels(tiles, len(listed) if counting else 0)
     block, over = block_of(tiles, threads, simt, mask=mask), np.array(background, np.float32)
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     reaches = np.empty((len(colours), REACH), np.float32)

@@ -37,6 +37,15 @@ class Pixels(NamedTuple):
     uses: NDArray[np.int32]
 
 
+def new_pixels(tiles: Tiles, entries: int = 0) -> Pixels:
+    """Allocate the pixels of a screen; ``entries`` whose uses are counted."""
+    shape = (tiles.height, tiles.width)
+    return Pixels(
+        np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32),
+        np.zeros((entries, 2), np.int32),
+    )  # fmt: skip
+
+
 @kernel(lent=True)
 def place(tile: int, tiles: Tiles, first: int, end: int, room: Room) -> Any:
     """Set up pixels of a tile: coordinates, who is on the screen; gives the rectangle around them."""

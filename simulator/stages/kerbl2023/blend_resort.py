@@ -31,7 +31,7 @@ from tilestamp.simulator.stages.kerbl2023.blend_block import (
     block_of,
     gather_sectors,
 )
-from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, PLANES, Pixels, store
+from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, PLANES, Pixels, new_pixels, store
 from tilestamp.simulator.stages.kerbl2023.blend_step import (
     ENTRY,
     ENTRY_RED,
@@ -165,11 +165,7 @@ def blend_resort(
         ``reached`` is the last in its list of the Gaussians that were blended.
     works : one, a row a tile
     """
-    shape = (tiles.height, tiles.width)
-    pixels = Pixels(
-        np.empty((*shape, 3), np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint32),
-        np.zeros((0, 2), np.int32),
-    )  # fmt: skip
+    pixels = new_pixels(tiles)
     matrices, centres = ray_rows(splats, camera)
     rays = Rays(
         np.concatenate([matrices.reshape(-1, 9), centres], axis=1).astype(np.float32), camera.tan_x, camera.tan_y

@@ -21,14 +21,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow
-from tilestamp.simulator.stages.laine2011.fine_raster import (
-    FrameBuffers,
-    count_tile,
-    draw_of,
-    load_tile,
-    new_buffers,
-    store_tile,
-)
+from tilestamp.simulator.stages.laine2011.fine_raster import draw_of
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
     FRAGMENTS,
@@ -49,6 +42,13 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads, draw_fragment
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
+from tilestamp.simulator.stages.laine2011.frame_buffers import (
+    FrameBuffers,
+    count_tile,
+    load_tile,
+    new_buffers,
+    store_tile,
+)
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 QUEUE_WORDS = 2  # of colour: a survivor's record and pixel take a word for each of up to 64, as a pixel's colour does

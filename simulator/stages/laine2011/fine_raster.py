@@ -4,12 +4,11 @@ A warp reads the tile's list 32 entries at a time, drops those behind the tile's
 the others, and draws their fragments 32 at a time, in input order: depth test, shading, conflict-free writes.
 """
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
@@ -17,7 +16,6 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow, row_of
 from tilestamp.simulator.stages.laine2011.fine_raster_multi import draw_tile_multi
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
-    PIXELS,
     TILE,
     Draw,
     FineRasterEvent,
@@ -26,10 +24,17 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     new_tile,
     start_tile,
 )
-from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import draw_tile_single
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
-from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
+from tilestamp.simulator.stages.laine2011.frame_buffers import (
+    FrameBuffers,
+    clear_depth_value,
+    count_tile,
+    load_layer,
+    load_tile,
+    new_buffers,
+    store_tile,
+)
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
@@ -43,79 +48,6 @@ MODES: dict[str, tuple[bool, bool, bool, bool]] = {  # depth, blend, write colou
     "color": (False, False, True, False),
 }
 _PART_TILES = 32  # tiles that one call of the worker takes, at least
-
-
-class FrameBuffers(NamedTuple):
-    """Pixels of a frame, whole tiles, row 0 the lowest row; samples first."""
-
-    color: NDArray[np.uint32]  # (samples, height, width) RGBA from the low byte up
-    depth: NDArray[np.uint32]  # fixed point, smaller is nearer
-    ids: NDArray[np.int32]  # input triangle, -1 where nothing was drawn
-
-
-@kernel(lent=True)
-def load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
-    """Clear a tile, or take its pixels from earlier draws."""
-    tile.owner[:] = -1
-    if draw.clear:
-        tile.depth[:] = draw.clear_depth
-        tile.color[:] = draw.clear_color
-        return
-    for sample in range(1 << draw.log_samples):
-        for p in range(PIXELS):
-            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            tile.depth[at], tile.color[at] = buffers.depth[sample, j, i], buffers.color[sample, j, i]
-
-
-@kernel(lent=True)
-def _load_layer(behind: Any, tile: Tile, x: int, y: int) -> None:
-    """Depths of the layer before, for depth peeling; nothing shows where they end."""
-    for p in range(PIXELS):
-        i, j = x + 7 - (p & 7), y + (p >> 3)
-        tile.zmax[p] = behind[j, i] if j < behind.shape[0] and i < behind.shape[1] else DEPTH_MAX
-
-
-@kernel(lent=True)
-def store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
-    """Write what a tile has, shaded where its fragments are shaded late."""
-    for sample in range(1 << draw.log_samples):
-        for p in range(PIXELS):
-            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            record, color = tile.owner[at], tile.color[at]
-            if record >= 0:
-                buffers.ids[sample, j, i] = setup.inputs[record]
-                if draw.shade_late:
-                    color = shade(setup.planes, record, colors, i, j, -1, draw)
-            elif draw.clear:
-                buffers.ids[sample, j, i] = -1
-            else:
-                continue
-            buffers.depth[sample, j, i], buffers.color[sample, j, i] = tile.depth[at], color
-
-
-@kernel(lent=True)
-def count_tile(draw: Draw, row: Any) -> None:
-    """Count what every tile costs: its draw from the counter, and its pixels read and written, 8 rows of 32 bytes.
-
-    Surfaces are laid out in two dimensions, so that a row of a tile is one 32-byte segment on every machine. Samples
-    stay in memory: with several of them the clear writes the tile, and nothing else here does.
-    """
-    row[FineRasterEvent.ATOMIC] += 1
-    row[FineRasterEvent.ATOMIC_LANES] += 1
-    row[FineRasterEvent.ATOMIC_REQUESTS] += 1
-    row[FineRasterEvent.ATOMIC_DEPTH] += 1
-    row[FineRasterEvent.LOAD_TRANSACTIONS] += 2  # the tile's number and its first segment
-    row[FineRasterEvent.LOAD_BYTES] += 2 * smallest_transaction_bytes(draw.coalescing)
-    surfaces = (1 if draw.write_color or draw.later_wins else 0) + 1
-    rows = surfaces * TILE << draw.log_samples
-    if not draw.clear and draw.log_samples == 0:
-        row[FineRasterEvent.TILE_LOADS] += 1
-        row[FineRasterEvent.LOAD_TRANSACTIONS] += rows
-        row[FineRasterEvent.LOAD_BYTES] += 32 * rows
-    if draw.clear or draw.log_samples == 0:
-        row[FineRasterEvent.TILE_STORES] += 1
-        row[FineRasterEvent.STORE_TRANSACTIONS] += rows
-        row[FineRasterEvent.STORE_BYTES] += 32 * rows
 
 
 @kernel
@@ -164,7 +96,7 @@ def _draw_tiles(
         x, y = (t % draw.tiles_x) * TILE, (t // draw.tiles_x) * TILE
         load_tile(buffers, draw, tile, x, y)
         if behind is not None:
-            _load_layer(behind, tile, x, y)
+            load_layer(behind, tile, x, y)
         start_tile(tile, starts[t], starts[t + 1])
         row = row_of(table, a)
         draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
@@ -182,20 +114,6 @@ def draw_tile(
         draw_tile_single(setup, entries, colors, draw, tile, left, bottom, row)
     else:
         draw_tile_multi(setup, entries, colors, draw, tile, left, bottom, row)
-
-
-def new_buffers(width: int, height: int, samples: int = 1, *, cleared: bool = True) -> FrameBuffers:
-    """Allocate the pixels of a frame, whole tiles, cleared to black and far where asked for."""
-    shape = (samples, -(-height // TILE) * TILE, -(-width // TILE) * TILE)
-    if not cleared:
-        return FrameBuffers(np.empty(shape, np.uint32), np.empty(shape, np.uint32), np.empty(shape, np.int32))
-    return FrameBuffers(np.zeros(shape, np.uint32), np.full(shape, DEPTH_MAX, np.uint32), np.full(shape, -1, np.int32))
-
-
-def clear_depth_value(depth: float) -> int:
-    """Fixed-point depth that a clear to ``depth`` in 0..1 writes; 1 is the far plane."""
-    whole = min(int(depth * 2**32), 2**32 - 1)
-    return int(whole / (2**32 - 1) * (DEPTH_MAX - DEPTH_MIN) + DEPTH_MIN)
 
 
 def draw_of(

@@ -23,10 +23,10 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import PIXELS, WARP, FineRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_work import DRAW_REQUESTS, fine_work
 from tilestamp.simulator.stages.laine2011.fragments import Fragments, events_with, front
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 Layout = Literal["linked", "round", "chunked", "fixed"]

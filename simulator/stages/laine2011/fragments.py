@@ -17,10 +17,11 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers, Lists, draw_of, draw_rows, new_buffers
+from tilestamp.simulator.stages.laine2011.fine_raster import Lists, draw_of, draw_rows
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import TILE, WARP, Draw, FineRasterEvent, corner
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
 from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers, new_buffers
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 _LOW = 0xFFFFFFFF

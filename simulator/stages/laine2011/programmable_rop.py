@@ -31,10 +31,10 @@ from tilestamp.simulator.stages.laine2011.blend_programs import (
     start_pixel,
     words_of,
 )
-from tilestamp.simulator.stages.laine2011.fine_raster import FrameBuffers
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
 from tilestamp.simulator.stages.laine2011.fragments import Fragments, events_with, front
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
 _LAYERED = ("LAYER_STEPS", "LAYER_LANES", "RESOLVE_LAYERS")
