@@ -8,7 +8,8 @@ import json
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from tilestamp.experiments.calibration.accuracy_tables import (
     ROOT,
@@ -25,9 +26,6 @@ from tilestamp.experiments.calibration.accuracy_tables import (
 from tilestamp.experiments.calibration.residuals import COVERAGE, SILICON
 from tilestamp.experiments.silicon.textured_compare import FRAME_TIME, SPAN
 from tilestamp.reports.accuracy_plot import accuracy_plot
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MARKER = "<!-- Written by experiments/calibration/accuracy.py from results: do not edit. -->"
 PLOT = Path("reports/gallery/accuracy.png")
@@ -70,7 +68,7 @@ def page(results: Path) -> str:
     return "\n".join(line for section in sections for line in section)
 
 
-def _head(results: Path, times: "pd.DataFrame") -> Iterator[str]:
+def _head(results: Path, times: pd.DataFrame) -> Iterator[str]:
     unseen, (mean, worst) = times[~times.seen], TIME_AIM
     means = {place: errors(rows).mean for place, rows in times.groupby(["family", "label"])}
     over = [f"{name} of {system} {_percent(of)} %" for (system, name), of in means.items() if of > KERNEL_AIM]
@@ -105,7 +103,7 @@ def _run(path: Path) -> str:
     return f"- {manifest['experiment']}, {manifest['date'][:10]}, sources {manifest['source_digest']}{without}"
 
 
-def _times(times: "pd.DataFrame") -> Iterator[str]:
+def _times(times: pd.DataFrame) -> Iterator[str]:
     yield from _title("Times of kernels over 5 us", "system", "kernel", "measured, us", *_both("mean / worst"))
     for (system, name), rows in times.groupby(["family", "label"]):
         measured = f"{rows.measured.min():.0f} to {rows.measured.max():.0f}"
@@ -116,7 +114,7 @@ def _both(what: str) -> list[str]:
     return [f"{which} {column}" for which in ("seen:", "unseen:") for column in ("cells", what, "ratio")]
 
 
-def _pair(rows: "pd.DataFrame") -> list[str]:
+def _pair(rows: pd.DataFrame) -> list[str]:
     """Cells, errors and ratios of some rows, empty where there is none."""
     found = errors(rows)
     if not found.cells:
@@ -124,14 +122,14 @@ def _pair(rows: "pd.DataFrame") -> list[str]:
     return [str(found.cells), _mean_worst(found), f"{found.lowest:.2f} to {found.highest:.2f}"]
 
 
-def _choices(table: "pd.DataFrame") -> Iterator[str]:
+def _choices(table: pd.DataFrame) -> Iterator[str]:
     yield from _title("The fastest of several, where they differ by 5 %", "choice", "right", "of")
     for name, pairs in choices(table).items():
         if pairs:
             yield _row(name, sum(measured == ours for measured, ours in pairs), len(pairs))
 
 
-def _quantities(table: "pd.DataFrame") -> Iterator[str]:
+def _quantities(table: pd.DataFrame) -> Iterator[str]:
     columns = [f"{which} {c}" for which in ("seen:", "unseen:") for c in ("cells", "mean / worst", "within the aim")]
     yield from _title("Counts, bytes and frames", "quantity", "aim", *columns)
     for name, (aim, percent) in AIMS.items():
@@ -142,7 +140,7 @@ def _quantities(table: "pd.DataFrame") -> Iterator[str]:
             yield _row(name, aims, *parts[0], *parts[1])
 
 
-def _within(rows: "pd.DataFrame", aim: float, *, percent: bool) -> list[str]:
+def _within(rows: pd.DataFrame, aim: float, *, percent: bool) -> list[str]:
     found = errors(rows)
     if not found.cells:
         return ["", "", ""]
@@ -150,7 +148,7 @@ def _within(rows: "pd.DataFrame", aim: float, *, percent: bool) -> list[str]:
     return [str(found.cells), _mean_worst(found, percent=percent), f"{100 * inside:.0f} %"]
 
 
-def _counts_by_kernel(table: "pd.DataFrame") -> Iterator[str]:
+def _counts_by_kernel(table: pd.DataFrame) -> Iterator[str]:
     yield from _title(
         "Counts and bytes by kernel: mean / worst over all scenes, % (efficiency: absolute)", "kernel", *BY_KERNEL
     )
@@ -162,8 +160,6 @@ def _counts_by_kernel(table: "pd.DataFrame") -> Iterator[str]:
 
 def _left_out(path: Path) -> Iterator[str]:
     """Constants refitted without the scene that is predicted, where that experiment was run."""
-    import pandas as pd
-
     if path.is_file():
         yield from _title(
             "A scene left out of the fit that predicts it", "kernel and quantity", "cells", "mean / worst"
@@ -173,7 +169,7 @@ def _left_out(path: Path) -> Iterator[str]:
             yield _row(name, len(rows), _mean_worst(errors(found)))
 
 
-def _intervals(times: "pd.DataFrame") -> Iterator[str]:
+def _intervals(times: pd.DataFrame) -> Iterator[str]:
     yield from _title(
         f"{_percent(COVERAGE)} % intervals: each experiment in those that the others give",
         "experiment",
@@ -184,7 +180,7 @@ def _intervals(times: "pd.DataFrame") -> Iterator[str]:
         yield _row(name, count, f"{100 * share:.1f} %")
 
 
-def _remaining(times: "pd.DataFrame") -> Iterator[str]:
+def _remaining(times: pd.DataFrame) -> Iterator[str]:
     """Errors by the term that holds, and by kernel and term."""
     if "bound" in times:
         columns = ("times", "mean / worst", "ratio", "share of all error")

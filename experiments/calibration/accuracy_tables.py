@@ -7,7 +7,9 @@ unseen where none does.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import pandas as pd
 
 from tilestamp.experiments.calibration.residuals import SILICON, by_term, coverage
 from tilestamp.experiments.silicon.textured_binned import GAP, STEP
@@ -16,9 +18,6 @@ from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME
 from tilestamp.models.error_model import ALL
 from tilestamp.models.fitted import on_frame
 from tilestamp.models.machine import list_machines, load_machine
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ROOT = Path(__file__).resolve().parents[2]
 FITTED_IN = ("models/machines/*.toml", "simulator/mixes/*/*.toml")
@@ -41,7 +40,7 @@ class Errors(NamedTuple):
     highest: float
 
 
-def read_results(results: Path) -> "pd.DataFrame":
+def read_results(results: Path) -> pd.DataFrame:
     """Every compared value of the silicon experiments.
 
     Returns
@@ -50,8 +49,6 @@ def read_results(results: Path) -> "pd.DataFrame":
         The columns of the experiments' tables ``all`` and: ``experiment``; ``family``; ``label``, the kernel's name
         (memsets together, samples apart); ``seen``; ``config``, if only "".
     """
-    import pandas as pd
-
     targets = fitted_targets()
     tables = [_read(path, targets) for path in sorted(results.glob(SILICON))]
     return pd.concat(tables, ignore_index=True)
@@ -64,9 +61,7 @@ def fitted_targets() -> list[str]:
     return [*dict.fromkeys(named), *GAP.fitted_to, *STEP.fitted_to]
 
 
-def _read(path: Path, targets: Sequence[str]) -> "pd.DataFrame":
-    import pandas as pd
-
+def _read(path: Path, targets: Sequence[str]) -> pd.DataFrame:
     table = pd.read_csv(path)
     experiment = path.parent.name
     own = [target for target in targets if target.split(" | ")[1] == experiment]
@@ -89,12 +84,12 @@ def label(kernel: str, spp: int) -> str:
     return ("memset" if kernel.startswith("memset") else kernel) + (f", {spp} spp" if spp else "")
 
 
-def kernel_times(table: "pd.DataFrame") -> "pd.DataFrame":
+def kernel_times(table: pd.DataFrame) -> pd.DataFrame:
     """Times of kernels and memsets over 5 us."""
     return table[(table.quantity == TIME) & (table.measured > SHORTEST_US)]
 
 
-def errors(rows: "pd.DataFrame") -> Errors:
+def errors(rows: pd.DataFrame) -> Errors:
     """Errors of some rows; nothing of no row."""
     if rows.empty:
         return Errors(0, 0.0, 0.0, 0.0, 0.0)
@@ -102,7 +97,7 @@ def errors(rows: "pd.DataFrame") -> Errors:
     return Errors(len(rows), error.mean(), error.max(), ratio.min(), ratio.max())
 
 
-def covered(times: "pd.DataFrame") -> Iterator[tuple[str, int, float]]:
+def covered(times: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
     """Which times, how many, and the share of them within the intervals that all others give.
 
     First one experiment after the other, then all times of unseen scenes.
@@ -115,7 +110,7 @@ def covered(times: "pd.DataFrame") -> Iterator[tuple[str, int, float]]:
             yield name, int(left.sum()), coverage(known[left], factors)
 
 
-def by_bound(times: "pd.DataFrame", *columns: str) -> list[tuple[tuple[str, ...], Errors, float]]:
+def by_bound(times: pd.DataFrame, *columns: str) -> list[tuple[tuple[str, ...], Errors, float]]:
     """Errors by the term that holds (and more columns), and the share of all error; the largest share first."""
     known = times.dropna(subset="bound")
     whole, groups = known.error.abs().sum(), known.groupby([*columns, "bound"])
@@ -123,7 +118,7 @@ def by_bound(times: "pd.DataFrame", *columns: str) -> list[tuple[tuple[str, ...]
     return sorted(found, key=lambda group: -group[2])
 
 
-def choices(table: "pd.DataFrame") -> dict[str, list[tuple[str, str]]]:
+def choices(table: pd.DataFrame) -> dict[str, list[tuple[str, str]]]:
     """Of each choice the pairs of what is the fastest, measured and ours, where the measured runner-up is not close."""
     times, frames = table[table.quantity == TIME], table[table.quantity == FRAME_TIME]
     tiles = times[times.kernel == "k_raster"]
@@ -139,14 +134,14 @@ def choices(table: "pd.DataFrame") -> dict[str, list[tuple[str, str]]]:
     }
 
 
-def _ways(frames: "pd.DataFrame", pattern: str) -> list[tuple[str, str]]:
+def _ways(frames: pd.DataFrame, pattern: str) -> list[tuple[str, str]]:
     """The fastest of the ways (first part of the pattern) to draw a scene with one sort of culling (second part)."""
     found = frames.config.str.extract(rf"^{pattern}$").dropna()
     rows = frames.loc[found.index].assign(culling=found[1])
     return _fastest(rows, ["scene", "culling"], found[0])
 
 
-def _systems(times: "pd.DataFrame") -> list[tuple[str, str]]:
+def _systems(times: pd.DataFrame) -> list[tuple[str, str]]:
     """CudaRaster's four kernels together against FreePipe, where both were measured."""
     chosen = times[times.kernel.isin(CUDARASTER) | (times.family == "FreePipe")]
     whole = chosen.assign(way=[k if k not in CUDARASTER else "CudaRaster" for k in chosen.kernel])
@@ -155,7 +150,7 @@ def _systems(times: "pd.DataFrame") -> list[tuple[str, str]]:
     return _fastest(sums, place, ["CudaRaster" if way == "CudaRaster" else "FreePipe" for way in sums.way])
 
 
-def _fastest(rows: "pd.DataFrame", place: list[str], option: Sequence[object]) -> list[tuple[str, str]]:
+def _fastest(rows: pd.DataFrame, place: list[str], option: Sequence[object]) -> list[tuple[str, str]]:
     """The option with the least time, measured and ours, at each place where another is slower by 5 % or more."""
     pairs = []
     if rows.empty:

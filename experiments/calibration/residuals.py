@@ -8,15 +8,12 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME
 from tilestamp.models.error_model import ALL, ELSEWHERE, PATH
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COVERAGE = 0.95
 SILICON = "silicon-*/all.csv"
@@ -36,23 +33,21 @@ def conformal_factor(ratios: Sequence[float]) -> float | None:
     return math.exp(distances[place - 1]) if place <= len(distances) else None
 
 
-def by_term(times: "pd.DataFrame") -> dict[str, tuple[int, float]]:
+def by_term(times: pd.DataFrame) -> dict[str, tuple[int, float]]:
     """Number of times and factor of each term that has enough, and of all; columns bound, ours, measured."""
     groups = {ALL: times, **{str(bound): group for bound, group in times.groupby("bound")}}
     found = {name: (len(group), conformal_factor(list(group.measured / group.ours))) for name, group in groups.items()}
     return {name: (count, factor) for name, (count, factor) in found.items() if factor is not None}
 
 
-def coverage(times: "pd.DataFrame", factors: Mapping[str, tuple[int, float]]) -> float:
+def coverage(times: pd.DataFrame, factors: Mapping[str, tuple[int, float]]) -> float:
     """Share of times within the factors that others gave."""
     allowed = [factors.get(bound, factors[ALL])[1] for bound in times.bound]
     return float((np.abs(np.log(times.measured / times.ours)) <= np.log(allowed)).mean())
 
 
-def silicon_times(results: Path) -> "pd.DataFrame":
+def silicon_times(results: Path) -> pd.DataFrame:
     """All kernel times over 5 us of the silicon experiments, with the experiment of each."""
-    import pandas as pd
-
     tables = [pd.read_csv(path).assign(experiment=path.parent.name) for path in sorted(results.glob(SILICON))]
     times = pd.concat([table for table in tables if "bound" in table])
     return times[(times.quantity == TIME) & (times.measured > SHORTEST_US)].reset_index(drop=True)
@@ -60,8 +55,6 @@ def silicon_times(results: Path) -> "pd.DataFrame":
 
 def published_ratios(results: Path) -> list[float]:
     """Published over ours, of the times of papers that are predicted."""
-    import pandas as pd
-
     paths = [path for pattern in FRAMES for path in sorted(results.glob(f"{pattern}/cells.csv"))]
     cells = pd.concat([pd.read_csv(path) for path in paths])
     cells = cells[(cells.status == "predicted") & cells.unit.isin(TIME_UNITS)].dropna(subset=["published", "ours"])

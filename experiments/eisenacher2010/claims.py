@@ -1,7 +1,5 @@
 """Claims of the text: box tests, STE, throughput, and the trade-off it leaves open (Eisenacher & Loop 2010)."""
 
-from typing import TYPE_CHECKING
-
 from tilestamp.experiments.eisenacher2010.frames import (
     KILLEROO,
     SOURCE,
@@ -12,9 +10,7 @@ from tilestamp.experiments.eisenacher2010.frames import (
 )
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
-
-if TYPE_CHECKING:
-    from tilestamp.simulator.run import Run
+from tilestamp.simulator.run import Run
 
 QUESTION = "Do box tests save what the text says, and is the sample test efficiency of an 8x8 stamp 2 %?"
 BOX_TEST_SAVING = 0.30  # of total time
@@ -95,11 +91,11 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _total(made: "Run") -> float:
+def _total(made: Run) -> float:
     return made.milliseconds + overhead_ms(made)
 
 
-def _notes(ste: float, ratio: float, made: "Run") -> list[str]:
+def _notes(ste: float, ratio: float, made: Run) -> list[str]:
     hits, grids = made.counts["tile_raster.SAMPLE_HITS"], made.counts["tile_raster.GRIDS"]
     return [
         (

@@ -1,16 +1,13 @@
 """Figure 4: tiles of 4, 8 and 16 pixels at four zoom levels: which is fastest, and why (Eisenacher & Loop 2010)."""
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, SOURCE, frame, overhead_ms, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "Which tile size is the fastest, near and far?"
 TILES = (4, 8, 16)
@@ -20,8 +17,6 @@ PUBLISHED_ORDER = "8x8 < 4x4 < 16x16"  # in time
 
 def run(progress: Progress) -> Result:
     """Price three tile sizes at four zoom levels."""
-    import pandas as pd
-
     rows = []
     for zoom in ZOOMS:
         for tile in TILES:
@@ -54,7 +49,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     """The fastest tile at each level, and by how much the next one is slower."""
     said = []
     for zoom in ZOOMS:
@@ -63,7 +58,7 @@ def _answer(table: "pd.DataFrame") -> str:
     return f"By the model {', '.join(said)}."
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     """The order at each zoom level, and the times that make it."""
     times = [
         Cell(
@@ -80,7 +75,7 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     return [*(_order(table, zoom) for zoom in ZOOMS), *times]
 
 
-def _order(table: "pd.DataFrame", zoom: int) -> Cell:
+def _order(table: pd.DataFrame, zoom: int) -> Cell:
     """Tile sizes in the order of their times."""
     times = table[table["zoom"] == zoom].sort_values("ms")
     made_of = tuple((f"zoom {zoom}", f"{tile} tiles") for tile in times["tile"])
@@ -94,7 +89,7 @@ def _frame(zoom: int) -> str:
     return KILLEROO if zoom == ZOOMS[0] else KILLEROO.replace(" ", f" zoom{zoom} ")
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     """Say which bound makes the order."""
     near = table[table["zoom"] == ZOOMS[0]].set_index("tile")
     lines_ = [
@@ -117,7 +112,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _draw(table: "pd.DataFrame", path: "Path") -> None:
+def _draw(table: pd.DataFrame, path: Path) -> None:
     table = table.assign(thousands=table["patches"] / 1000)
     lines(
         table,
@@ -132,7 +127,7 @@ def _draw(table: "pd.DataFrame", path: "Path") -> None:
     )
 
 
-def _order_said(rows: "pd.DataFrame", zoom: int) -> tuple[float, float, str]:
+def _order_said(rows: pd.DataFrame, zoom: int) -> tuple[float, float, str]:
     """Whether the order at a zoom level is as published, above its slowest tile."""
     top = rows.loc[rows["ms"].idxmax()]
     ours = " < ".join(rows.sort_values("ms")["tile"])

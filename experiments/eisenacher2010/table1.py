@@ -1,21 +1,17 @@
 """Table 1: bucketing 270 k sub-patches by tiles of 4, 8, 16 and 32 pixels (Eisenacher & Loop 2010)."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, SOURCE, frame, stage_ms, stand_in_warnings
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "Why does bucketing take longer with larger tiles?"
 SUBPATCHES = 270_000  # as printed
@@ -29,8 +25,6 @@ CONFLICTS = {
 
 def run(progress: Progress) -> Result:
     """Count and price the bucketing of one frame at four tile sizes."""
-    import pandas as pd
-
     cells: list[Cell] = []
     rows = []
     for line in published(__file__, "table1").itertuples():
@@ -68,13 +62,13 @@ def run(progress: Progress) -> Result:
     )
 
 
-def bucketing(made: "Run") -> "Run":
+def bucketing(made: Run) -> Run:
     """Price what was counted without the tile raster: a GTX 280 cannot launch the 1024 threads of a 32-pixel tile."""
     works = [work for work in made.frame.works if work.stage != "tile_raster"]
     return replace(made, frame=replace(made.frame, works=works), fidelity="schedule")
 
 
-def _cells(line: "pd.Series[float]", made: "Run") -> list[Cell]:
+def _cells(line: "pd.Series[float]", made: Run) -> list[Cell]:
     """Cells of one tile size."""
     tile = int(line.tile_size)
     written = made.frame.facts["patches_written"]
@@ -113,7 +107,7 @@ def _cells(line: "pd.Series[float]", made: "Run") -> list[Cell]:
     ]
 
 
-def _why(made: "Run") -> dict[str, float]:
+def _why(made: Run) -> dict[str, float]:
     """What makes the address calculation slow."""
     queues = [work.atomic_requests for work in made.frame.works if isinstance(work, Work)]
     fullest = max(int(queue.max()) for queue in queues if queue is not None)
@@ -121,11 +115,11 @@ def _why(made: "Run") -> dict[str, float]:
     return {"ours": stage_ms(made, "bucket_count"), "fullest lock": fullest, **counts}
 
 
-def _growth(table: "pd.DataFrame") -> str:
+def _growth(table: pd.DataFrame) -> str:
     return f"{table['fullest lock'].iloc[-1] / table['fullest lock'].iloc[0]:.0f} times"
 
 
-def _draw(table: "pd.DataFrame", path: "Path") -> None:
+def _draw(table: pd.DataFrame, path: Path) -> None:
     labelled = table.assign(stage="address calculation, model")
     lines(
         labelled,

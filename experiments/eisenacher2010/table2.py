@@ -1,16 +1,15 @@
 """Table 2: three models, two screens, two bounds, one and four samples a pixel (Eisenacher & Loop 2010)."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result
 from tilestamp.reports.bars import paired_bars
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 QUESTION = "How long does a frame of each model take, on two screens, with two bounds, at one and four samples a pixel?"
 COUNT_AIM, TIME_AIM = 0.03, 0.15
@@ -73,9 +72,7 @@ def _answer(cells: Sequence[Cell]) -> str:
     )
 
 
-def _draw(cells: Sequence[Cell], path: "Path") -> None:
-    import pandas as pd
-
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     times = [c for c in cells if c.unit == "ms"]
     table = pd.DataFrame(
         {

@@ -1,7 +1,9 @@
 """Table 3: time of each stage, hybrid and software at 1, 4 and 16 samples a pixel (Eisenacher & Loop 2010)."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import (
     KILLEROO,
@@ -15,13 +17,9 @@ from tilestamp.experiments.eisenacher2010.frames import (
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.reports.bars import stacked_bars
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import TileRasterEvent as E
 from tilestamp.simulator.work import Work
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "How long does each stage take, in software and in the hybrid?"
 STAGE_AIM, TOTAL_AIM = 0.20, 0.10
@@ -91,7 +89,7 @@ def _answer(stages: dict[str, dict[str, float]]) -> str:
     )
 
 
-def _software_stages(made: "Run") -> dict[str, float]:
+def _software_stages(made: Run) -> dict[str, float]:
     """Milliseconds by the paper's rows."""
     setup = setup_ms(made)
     return {
@@ -105,7 +103,7 @@ def _software_stages(made: "Run") -> dict[str, float]:
     }
 
 
-def setup_ms(made: "Run") -> float:
+def setup_ms(made: Run) -> float:
     """Time of the tile raster without its quads: blocks start, grids are loaded, pixels are written."""
     raster = next(work for work in made.frame.works if isinstance(work, Work) and work.stage == "tile_raster")
     table = raster.table.copy()
@@ -161,9 +159,7 @@ def _hybrid_cells(ours: dict[str, float], software_ms: float) -> list[Cell]:
     ]
 
 
-def _draw(stages: dict[str, dict[str, float]], path: "Path") -> None:
-    import pandas as pd
-
+def _draw(stages: dict[str, dict[str, float]], path: Path) -> None:
     table: pd.DataFrame = pd.DataFrame(stages).T.fillna(0.0)
     known = pd.DataFrame(PUBLISHED_MS).T
     stacked_bars(table, path, title="Time of each stage, killeroo on a GTX 280", unit="time [ms]", published=known)

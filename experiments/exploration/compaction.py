@@ -1,8 +1,9 @@
 """Compact after discard: warps that shade what an alpha test leaves, before and after survivors are gathered."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -15,9 +16,6 @@ from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.scene import Mesh, Scene, clip_space_scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "How full are the warps that shade what an alpha test leaves, and does gathering survivors pay?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -76,8 +74,6 @@ def _discarded(run: Run) -> float:
 
 def run(progress: Progress) -> Result:
     """Draw foliage at each share with and without compaction."""
-    import pandas as pd
-
     rows = []
     for feature in FEATURES:
         for layers in LAYERS:
@@ -129,7 +125,7 @@ def _issued(price: dict[str, Any]) -> float:
     return sum(float(price.get(kind.name.lower(), 0)) for kind in INSTRUCTION_CLASSES)
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     layers, share = SHOWN
     at = {f: table[(table.feature == f) & (table.layers == layers) & (table.share == share)].iloc[0] for f in FEATURES}
     fine, coarse = (at[f] for f in FEATURES)
@@ -159,9 +155,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _figures(table: "pd.DataFrame") -> list[Figure]:
-    import pandas as pd
-
+def _figures(table: pd.DataFrame) -> list[Figure]:
     layers, share = SHOWN
     shown = table[table.layers == layers]
     lanes = pd.concat(

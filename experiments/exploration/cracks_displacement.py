@@ -6,9 +6,11 @@ the tiny tiles" (Eisenacher & Loop 2010, section 5). The atlas says where each b
 """
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way
@@ -21,11 +23,6 @@ from tilestamp.experiments.studies_shipped.finding import finding, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What does a picture without cracks cost against its error, and what do bounds cost that displacement keeps?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -50,8 +47,6 @@ def bumpy(height: float, bound: float) -> Way:
 
 def run(progress: Progress) -> Result:
     """Draw sheets with each cure of cracks, and the teapot with bumps of growing height."""
-    import pandas as pd
-
     rows = []
     for bound in BOUNDS:
         progress(f"exploration/cracks_displacement: cracks, bound {bound:g}")
@@ -119,7 +114,7 @@ def _bumps(height: float, bound: float) -> list[dict[str, Any]]:
     ]
 
 
-def _notes(cracks: "pd.DataFrame", bumps: "pd.DataFrame") -> list[str]:
+def _notes(cracks: pd.DataFrame, bumps: pd.DataFrame) -> list[str]:
     """What each costs."""
     said = []
     for bound in BOUNDS:
@@ -141,19 +136,19 @@ def _notes(cracks: "pd.DataFrame", bumps: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _slack(bumps: "pd.DataFrame") -> float:
+def _slack(bumps: pd.DataFrame) -> float:
     """How much wider grids might have been."""
     return float((bumps.bound / bumps.widest).max())
 
 
-def _front(cracks: "pd.DataFrame", path: "Path") -> None:
+def _front(cracks: pd.DataFrame, path: Path) -> None:
     lines(
         cracks, path, x="ms", y="flip", by="cure", log_x=True, title="Rough sheets: picture error against time",
         x_label="milliseconds a sheet", y_label="FLIP",
     )  # fmt: skip
 
 
-def _cost(bumps: "pd.DataFrame", path: "Path") -> None:
+def _cost(bumps: pd.DataFrame, path: Path) -> None:
     lines(
         bumps.assign(line=bumps.bound.map(lambda bound: f"bound {bound:g}")), path, x="height", y="ms", by="line",
         title=f"Frame with bumps, {MACHINES[1]}", x_label="height of bumps [units]", y_label="milliseconds",

@@ -1,8 +1,9 @@
 """Decoupled sampling: shades a pixel against the size of the cache, with motion blur and defocus, and what rates do."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.quad_merging import mesh
@@ -21,9 +22,6 @@ from tilestamp.simulator.stages.ragankelley2011.decoupled_shading import (
     Shading,
     decoupled_shading,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "How many shades a pixel do motion blur and defocus need, and how large a cache?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -53,8 +51,6 @@ def shade(area: float, blur: float, shading: Shading) -> tuple[float, ShadedSamp
 
 def run(progress: Progress) -> Result:
     """Sweep cache, blur, area and rate."""
-    import pandas as pd
-
     rows = []
     for area in AREAS:
         for blur in BLURS:
@@ -113,10 +109,8 @@ def _rate(rate: float) -> dict[str, float]:
     return {"rate": rate, "shades": shades, "flip": flip(exact, np.round(255 * ours).astype(np.uint8))}
 
 
-def _frames() -> "pd.DataFrame":
+def _frames() -> pd.DataFrame:
     """Time of the teapot's frame by how it is shaded."""
-    import pandas as pd
-
     ways: dict[str, dict[str, Any]] = {"not shaded": {}, "decoupled": {"shade_cache": 64}}
     ways["by pixel"] = {"shade_cache": 64, "decoupled": False}
     runs = {name: simulate("teapot", "interval", MACHINE, **FRAME, **options) for name, options in ways.items()}
@@ -126,7 +120,7 @@ def _frames() -> "pd.DataFrame":
     )
 
 
-def _notes(table: "pd.DataFrame", rates: "pd.DataFrame", frames: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame, rates: pd.DataFrame, frames: pd.DataFrame) -> list[str]:
     at = table.set_index(["way", "area", "blur", "cache"]).shades
     ours, theirs = (at[way, SHOWN_AREA, SHOWN_BLUR, ENOUGH] for way in ("decoupled", "pixel"))
     ms, shades = (frames.set_index("way")[column] for column in ("ms", "shades"))
@@ -156,9 +150,7 @@ def _notes(table: "pd.DataFrame", rates: "pd.DataFrame", frames: "pd.DataFrame")
     ]
 
 
-def _figures(table: "pd.DataFrame", rates: "pd.DataFrame") -> list[Figure]:
-    import pandas as pd
-
+def _figures(table: pd.DataFrame, rates: pd.DataFrame) -> list[Figure]:
     decoupled = table[table.way == "decoupled"]
     shown = decoupled[decoupled.blur == SHOWN_BLUR].assign(line=decoupled.area.map("{:g} px a triangle".format))
     flat = table[(table.way == "pixel") & (table.blur == SHOWN_BLUR)]

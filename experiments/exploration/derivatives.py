@@ -1,8 +1,7 @@
 """Non-quad derivatives: mip levels from the planes of a triangle against differences in quads of 2x2 pixels."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.methods_scenes import Subject, textured_subject
@@ -15,9 +14,6 @@ from tilestamp.reports.ste_plots import heat_maps
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.scene import Mesh, clip_space_scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "What do derivatives without quads cost, and which mip levels do they choose?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -76,8 +72,6 @@ def levels(tilt: float) -> dict[str, NDArray[np.float64]]:
 
 def run(progress: Progress) -> Result:
     """Levels and pictures by tilt; instructions by area of the triangles."""
-    import pandas as pd
-
     rows, pictures = [], {}
     for tilt in TILTS:
         progress(f"tilt {tilt:g}")
@@ -134,7 +128,7 @@ def _costs(area: float, progress: Progress) -> list[dict[str, float | str]]:
     return rows
 
 
-def _notes(by_tilt: "pd.DataFrame", by_area: "pd.DataFrame") -> list[str]:
+def _notes(by_tilt: pd.DataFrame, by_area: pd.DataFrame) -> list[str]:
     cost = by_area.pivot_table(index="area", columns="way", values=["instructions", "lanes", "ms"])
     ratio = cost["instructions"]["planes"] / cost["instructions"]["quads"]
     small, large = min(AREAS), max(AREAS)
@@ -161,9 +155,7 @@ def _notes(by_tilt: "pd.DataFrame", by_area: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _figures(by_tilt: "pd.DataFrame", by_area: "pd.DataFrame") -> list[Figure]:
-    import pandas as pd
-
+def _figures(by_tilt: pd.DataFrame, by_area: pd.DataFrame) -> list[Figure]:
     errors = pd.concat([by_tilt.assign(line=way, y=by_tilt[f"flip_{way}"]) for way in WAYS])
     off = {f"tilt {tilt:g}": np.abs(np.subtract(*levels(tilt).values()))[::-1] for tilt in (0.8, 0.95)}
     return [

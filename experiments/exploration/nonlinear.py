@@ -1,8 +1,10 @@
 """Pictures that bend straight edges: a line of sight a sample against tessellation until straight lines will do."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.registry import Progress
@@ -14,10 +16,6 @@ from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.camera import ModelToClip
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
 
 QUESTION = "What does a fisheye cost with a line of sight a sample, and what by tessellation that errs as little?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -61,8 +59,6 @@ def draw(kind: str, side: int, **options: Any) -> Run:
 
 def run(progress: Progress) -> Result:
     """Draw each projection and size of triangle by lines of sight, in both precisions, and by tessellation."""
-    import pandas as pd
-
     rows, pictures = [], {}
     for kind in VIEWS:
         for side in SIDES:
@@ -89,7 +85,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _row(method: str, drawn: Run, right: "NDArray[np.int32] | None") -> dict[str, Any]:
+def _row(method: str, drawn: Run, right: NDArray[np.int32] | None) -> dict[str, Any]:
     tests, hits = (int(drawn.stages[column].sum()) for column in ("sample_tests", "sample_hits"))
     return {
         "method": method, "ms": drawn.milliseconds, "wrong": float(np.mean(drawn.triangle_ids != right)),
@@ -98,7 +94,7 @@ def _row(method: str, drawn: Run, right: "NDArray[np.int32] | None") -> dict[str
     }  # fmt: skip
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     return [
         Cell(
             f"{r['kind']}, {r['triangles']} triangles, {r['method']}", column, unit, published=None, ours=r[column],
@@ -109,7 +105,7 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     ]  # fmt: skip
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     """Time of the finest chords over that of lines of sight, and what is wrong still."""
     finest = table[table.method == f"chords within {min(TOLERANCES):g} px"].set_index(["kind", "triangles"])
     sight = table[table.method == LINES].set_index(["kind", "triangles"])
@@ -123,7 +119,7 @@ def _answer(table: "pd.DataFrame") -> str:
     )
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     large = table[table.side == min(SIDES)]
     worst = large[large.method == f"chords within {max(TOLERANCES):g} px"].set_index("kind").wrong
     sight = table[table.method == LINES].set_index(["kind", "side"])
@@ -146,7 +142,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _figures(table: "pd.DataFrame", pictures: "dict[str, NDArray[np.uint8]]") -> list[Figure]:
+def _figures(table: pd.DataFrame, pictures: dict[str, NDArray[np.uint8]]) -> list[Figure]:
     made = []
     for kind, image in pictures.items():
         rows = table[table.kind == kind]

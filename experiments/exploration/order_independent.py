@@ -9,9 +9,11 @@ medians of 15 launches between CUDA events. What it drew was this experiment's p
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.exploration.transparent_scenes import confetti
 from tilestamp.experiments.frontier.pareto import pareto_front
@@ -27,12 +29,6 @@ from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.laine2011.blend_programs import BUILT_IN, words_of
 from tilestamp.simulator.stages.laine2011.fragment_lists import Z_BUFFER_BYTES
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-    from numpy.typing import NDArray
 
 QUESTION = "What does transparency without an order of input cost, and how far off are methods that bound its memory?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -59,8 +55,6 @@ HARDWARE = (2.1, 3.6)  # memory of a hardware A-buffer over a z-buffer's: Witten
 
 def run(progress: Progress) -> Result:
     """Draw more and more layers by each method."""
-    import pandas as pd
-
     rows = []
     for layers in LAYERS:
         progress(f"exploration/order_independent: {layers} layers")
@@ -140,7 +134,7 @@ def words(method: str) -> int:
     return words_of(BUILT_IN.index(options.get("blend", BUILT_IN[0])), options.get("layers", 1))
 
 
-def cells(table: "pd.DataFrame") -> list[Cell]:
+def cells(table: pd.DataFrame) -> list[Cell]:
     """Time, memory and error; and the resolve pass beside what an H200 took."""
     said = [("time", "ms", "ms"), ("memory", "z-buffers", "memory"), ("error", "steps of a byte", "rms")]
     found = [
@@ -156,7 +150,7 @@ def cells(table: "pd.DataFrame") -> list[Cell]:
     ]  # fmt: skip
 
 
-def notes(table: "pd.DataFrame") -> list[str]:
+def notes(table: pd.DataFrame) -> list[str]:
     """Answer first."""
     first = table[(table["machine"] == MACHINES[0]) & (table["layers"] == MIDDLE)].set_index("method")
     times, off = first["ms"], first["rms"]
@@ -182,7 +176,7 @@ def notes(table: "pd.DataFrame") -> list[str]:
     return [answer, *said, SURE]
 
 
-def _atomics(table: "pd.DataFrame", machine: str) -> str:
+def _atomics(table: pd.DataFrame, machine: str) -> str:
     mine = table[(table["machine"] == machine) & (table["layers"] == MIDDLE)].set_index("method")
     told = ", ".join(
         f"{name} {mine.loc[name, 'ms']:.3g} ms and {mine.loc[name, 'atomics']:,.0f} atomics"
@@ -191,7 +185,7 @@ def _atomics(table: "pd.DataFrame", machine: str) -> str:
     return f"{machine}, room for {MIDDLE} layers: {told} (draws of tiles among them)."
 
 
-def _freepipe(first: "pd.DataFrame") -> str:
+def _freepipe(first: pd.DataFrame) -> str:
     made = simulate(layered(MIDDLE), "freepipe", MACHINES[0], width=SIDE, height=SIDE, picture=False)
     return (
         f"FreePipe's kernel alone takes {made.milliseconds:.3g} ms of that frame on the {MACHINES[0]}, for "
@@ -200,7 +194,7 @@ def _freepipe(first: "pd.DataFrame") -> str:
     )
 
 
-def _resolve(table: "pd.DataFrame") -> str:
+def _resolve(table: pd.DataFrame) -> str:
     mine = [cell for cell in cells(table) if cell.published is not None and isinstance(cell.ours, float)]
     told = ", ".join(f"{cell.row} {1000 * cell.ours:.0f} for {1000 * float(cell.published or 0):.0f}" for cell in mine)
     return (
@@ -209,7 +203,7 @@ def _resolve(table: "pd.DataFrame") -> str:
     )
 
 
-def _memory(table: "pd.DataFrame") -> str:
+def _memory(table: pd.DataFrame) -> str:
     mine = table[(table["machine"] == MACHINES[0]) & (table["method"] == "linked")]
     slope = float(np.polyfit(mine["fragments"], mine["memory"], 1)[0])
     where = [(bound - 1.5) / slope for bound in HARDWARE]
@@ -222,7 +216,7 @@ def _memory(table: "pd.DataFrame") -> str:
     )
 
 
-def _bounded(table: "pd.DataFrame") -> str:
+def _bounded(table: pd.DataFrame) -> str:
     mine = table[(table["machine"] == MACHINES[0]) & table["method"].isin(["fixed 8", "k-buffer 8", "stochastic 16"])]
     told = (
         f"{method} {', '.join(f'{off:.1f}' for off in rows.sort_values('layers')['rms'])}"
@@ -239,7 +233,7 @@ SURE = (
 )
 
 
-def _draw_front(table: "pd.DataFrame", path: "Path") -> None:
+def _draw_front(table: pd.DataFrame, path: Path) -> None:
     panels(
         table.assign(second=False), path, panel="machine", group="kind", x="ms", y="rms", front="front",
         second="second",
@@ -247,7 +241,7 @@ def _draw_front(table: "pd.DataFrame", path: "Path") -> None:
     )  # fmt: skip
 
 
-def _draw_growth(table: "pd.DataFrame", y: str, label: str, title: str, path: "Path") -> None:
+def _draw_growth(table: pd.DataFrame, y: str, label: str, title: str, path: Path) -> None:
     shown = table[table.groupby("method")[y].transform("max") > 0]
     lines(
         shown, path, x="fragments", y=y, by="method", title=title, x_label="fragments a pixel", y_label=label,
@@ -255,9 +249,9 @@ def _draw_growth(table: "pd.DataFrame", y: str, label: str, title: str, path: "P
     )  # fmt: skip
 
 
-def _draw_pictures(path: "Path") -> None:
+def _draw_pictures(path: Path) -> None:
     scene, part = layered(MIDDLE), 160
-    images: list[NDArray[np.uint8]] = [drawn(scene, name, MACHINES[0]).image[:part, :part] for name in SHOWN]
+    images: list[Any] = [drawn(scene, name, MACHINES[0]).image[:part, :part] for name in SHOWN]
     gap = np.full((part, 4, 3), 255, np.uint8)
     row = np.concatenate([piece for image in images for piece in (image, gap)][:-1], axis=1)
     picture(row, path, title="; ".join(SHOWN))

@@ -6,9 +6,11 @@ in shared memory. Both are tried on the teapot, and on sheets that cover the scr
 """
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, other_pixels
@@ -19,11 +21,6 @@ from tilestamp.experiments.studies_shipped.finding import finding, reported
 from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.scene import Patches, Scene
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = (
     "What do coverage tests that overlap makes unnecessary cost, and what is left of that by sorting and culling?"
@@ -57,8 +54,6 @@ def sheets(cull: str, layers: int) -> Way:
 
 def run(progress: Progress) -> Result:
     """Draw the teapot and the sheets with each way of culling."""
-    import pandas as pd
-
     rows = []
     for tile in TILES:
         progress(f"exploration/overlap: teapot, tile {tile}")
@@ -108,7 +103,7 @@ def _row(way: Way, plain: Way, machine: str, cull: str, tile: int = 8, layers: i
     }
 
 
-def _ratios(table: "pd.DataFrame") -> "pd.DataFrame":
+def _ratios(table: pd.DataFrame) -> pd.DataFrame:
     """Tests and times over those without culling."""
     keys = ["scene", "what", "machine"]
     plain = table[table.cull == "none"].set_index(keys)
@@ -118,7 +113,7 @@ def _ratios(table: "pd.DataFrame") -> "pd.DataFrame":
     return joined
 
 
-def _notes(ratios: "pd.DataFrame") -> list[str]:
+def _notes(ratios: pd.DataFrame) -> list[str]:
     """What culling spares, and whether sorting is worth its price."""
     pot = ratios[ratios.scene == "teapot"].set_index(["what", "machine", "cull"])
     said = []
@@ -149,7 +144,7 @@ def _times(ms: "pd.Series[float]") -> str:
     return f"{ms['none']:.3g} ms, {ms['behind']:.3g} culled in list order, {ms['sorted']:.3g} sorted"
 
 
-def _plot(ratios: "pd.DataFrame", path: "Path") -> None:
+def _plot(ratios: pd.DataFrame, path: Path) -> None:
     deep = ratios[(ratios.scene == "sheets") & (ratios.cull != "none")]
     lines(
         deep.assign(line=deep.machine + ", " + deep.cull), path, x="layers", y="ms_ratio", by="line", log_x=True,
@@ -157,6 +152,6 @@ def _plot(ratios: "pd.DataFrame", path: "Path") -> None:
     )  # fmt: skip
 
 
-def _map(share: NDArray[np.float64], path: "Path") -> None:
+def _map(share: NDArray[np.float64], path: Path) -> None:
     title = "Coverage tests that sorted culling spares, by tile"
     heat_map(np.where(share > 0, share, np.nan), path, title=title, unit="tests spared [%]", size=SIZE, tile=8)

@@ -5,9 +5,10 @@ pile by pile they do, and take turns. The picture does not depend on that: it is
 """
 
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.exploration.transparent_scenes import confetti, piles
 from tilestamp.experiments.harness.registry import Progress
@@ -19,11 +20,6 @@ from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
 QUESTION = "What does a user's program in the ROP cost, and what do fragments of one pixel that meet in a warp?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
 MACHINES = ("gtx480", "h200")
@@ -34,8 +30,6 @@ STAGE = "fine_raster"
 
 def run(progress: Progress) -> Result:
     """Draw each pile in both orders by each program."""
-    import pandas as pd
-
     rows = []
     for leg in LEGS:
         progress(f"exploration/programmable_rop: triangles of {leg * leg / 2:g} pixels")
@@ -76,13 +70,13 @@ def _measured(made: Run) -> tuple[float, float, float, float]:
     return steps / rounds, lanes / steps, float(made.stages.loc[STAGE, "milliseconds"]), made.milliseconds
 
 
-def conflict_ratios(table: "pd.DataFrame") -> "pd.DataFrame":
+def conflict_ratios(table: pd.DataFrame) -> pd.DataFrame:
     """Time of fine raster pile by pile over that layer by layer."""
     times = table.pivot_table("fine_ms", ["machine", "program", "pixels"], "together", sort=False)
     return (times[True] / times[False]).rename("ratio").reset_index()
 
 
-def notes(table: "pd.DataFrame", ratios: "pd.DataFrame") -> list[str]:
+def notes(table: pd.DataFrame, ratios: pd.DataFrame) -> list[str]:
     """Answer first."""
     smallest, largest = table["pixels"].min(), table["pixels"].max()
     worst = ratios.loc[ratios["ratio"].idxmax()]
@@ -106,7 +100,7 @@ def notes(table: "pd.DataFrame", ratios: "pd.DataFrame") -> list[str]:
     return said
 
 
-def _draw_conflicts(ratios: "pd.DataFrame", path: "Path") -> None:
+def _draw_conflicts(ratios: pd.DataFrame, path: Path) -> None:
     lines(
         ratios.assign(line=ratios["machine"] + ", " + ratios["program"]), path, x="pixels", y="ratio", by="line",
         log_x=True, title="Fine raster with the fragments of a pixel together, over apart",
@@ -114,7 +108,7 @@ def _draw_conflicts(ratios: "pd.DataFrame", path: "Path") -> None:
     )  # fmt: skip
 
 
-def _draw_pictures(path: "Path") -> None:
+def _draw_pictures(path: Path) -> None:
     side = 160
     scene = confetti(side, 30, 90.0)
     images = [drawn(scene, program, side=side).image for program in PROGRAMS]

@@ -1,8 +1,9 @@
 """Quad merging: what shading in 2x2 quads costs by triangle area, and what a buffer that merges them saves."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.picture_error import flip
@@ -18,9 +19,6 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_s
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2010.quad_shading import QuadEvent, quad_shading
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "By how much does merging quads of neighbouring triangles reduce shading, and what does that take?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -78,8 +76,6 @@ def shaded(polygons: Micropolygons, spp: int, entries: int, shared: int = 1) -> 
 
 def run(progress: Progress) -> Result:
     """Sweep area, samples, rule and buffer; then price a model's frame."""
-    import pandas as pd
-
     rows, buffers = [], []
     for area in AREAS:
         progress(f"triangles of {area:g} pixels")
@@ -113,10 +109,8 @@ def _row(plain: int, merged: int) -> dict[str, float]:
     return {"plain": 4 * plain / SIDE**2, "merged": 4 * merged / SIDE**2, "factor": plain / merged}
 
 
-def _frames() -> "pd.DataFrame":
+def _frames() -> pd.DataFrame:
     """Time and picture error of the teapot, and the shader from which merging pays by instructions issued."""
-    import pandas as pd
-
     runs = {n: simulate("teapot", pipeline="stamps", machine=MACHINE, merge_entries=n, **FRAME) for n in FRAME_ENTRIES}
     price = load_mix("stamps", load_machine(MACHINE).compute_capability).kernels["quad_shading"].prices[SHADER]
     length = sum(price.get(kind.name.lower(), 0) for kind in INSTRUCTION_CLASSES)
@@ -135,7 +129,7 @@ def _frames() -> "pd.DataFrame":
     return table
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     """The published factor beside ours at a pixel's size, by rule; elsewhere ours alone."""
     cells = []
     for row in table.to_dict("records"):
@@ -154,7 +148,7 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     return cells
 
 
-def _answer(table: "pd.DataFrame", buffers: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame, buffers: pd.DataFrame) -> str:
     sized = table[table.area == PIXEL_SIZED].set_index(["spp", "rule"])
     corner, edge, any_ = (sized.xs(RULES[n], level="rule") for n in (1, 2, 0))
     rows = buffers[(buffers.area == PIXEL_SIZED) & (buffers.spp == max(SAMPLES))]
@@ -171,7 +165,7 @@ def _answer(table: "pd.DataFrame", buffers: "pd.DataFrame") -> str:
     )
 
 
-def _notes(buffers: "pd.DataFrame", frames: "pd.DataFrame") -> list[str]:
+def _notes(buffers: pd.DataFrame, frames: pd.DataFrame) -> list[str]:
     large = buffers[(buffers.area == 10.0) & (buffers.spp == 4)].set_index("entries").factor
     row = frames[frames.entries == BUFFER].iloc[0]
     first = frames.iloc[0]
@@ -191,9 +185,7 @@ def _notes(buffers: "pd.DataFrame", frames: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _figures(table: "pd.DataFrame", buffers: "pd.DataFrame") -> list[Figure]:
-    import pandas as pd
-
+def _figures(table: pd.DataFrame, buffers: pd.DataFrame) -> list[Figure]:
     corner = table[table.rule == RULES[1]]
     plain = corner.assign(y=corner.plain, line=corner.spp.map("{} samples, quads".format))
     merged = corner.assign(y=corner.merged, line=corner.spp.map(f"{{}} samples, merged by {BUFFER} entries".format))

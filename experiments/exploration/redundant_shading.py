@@ -9,9 +9,11 @@ shader is a Phong light on a checker: how much dearer must a shader be until a r
 import math
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, megabytes, milliseconds, other_pixels
 from tilestamp.experiments.harness.registry import Progress
@@ -22,14 +24,8 @@ from tilestamp.models.launch import Launch
 from tilestamp.models.price import price
 from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.work import Work
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "What do larger grids, shared vertices and shading after visibility save, and from which shader on?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -51,8 +47,6 @@ PUBLISHED = {"4x4 (published)": 16 / 9, "5x5": 25 / 16}  # vertices shaded a qua
 
 def run(progress: Progress) -> Result:
     """Draw the teapot in every way, and price it with shaders of growing cost."""
-    import pandas as pd
-
     rows: list[dict[str, Any]] = []
     for way in WAYS:
         progress(f"exploration/redundant_shading: {way.name}")
@@ -88,7 +82,7 @@ def _row(way: Way, machine: str) -> dict[str, Any]:
     }
 
 
-def diced_quads(run: "Run") -> int:
+def diced_quads(run: Run) -> int:
     """Quads of all grids of a frame."""
     return int(run.frame.facts["subpatches"] * (run.options["grid"] - 1) ** 2)
 
@@ -99,7 +93,7 @@ def _costs(way: Way, machine: str) -> list[dict[str, Any]]:
     return [{"way": way.name, "machine": machine, "shader": extra, "ms": with_shader(run, extra)} for extra in SHADERS]
 
 
-def with_shader(run: "Run", extra: float) -> float:
+def with_shader(run: Run, extra: float) -> float:
     """Milliseconds of a frame whose shader takes ``extra`` further multiply-adds, in chains half as long."""
     launches = [
         _dearer(launch, work, extra)
@@ -123,7 +117,7 @@ def _dearer(launch: Launch, work: Work, extra: float) -> Launch:
     return replace(launch, events=events)
 
 
-def pays_from(costs: "pd.DataFrame", way: str, machine: str) -> float:
+def pays_from(costs: pd.DataFrame, way: str, machine: str) -> float:
     """Further instructions a vertex from which a way is faster than the published one; infinite if never here."""
     of_machine = costs[costs.machine == machine]
     ours, base = (of_machine[of_machine.way == name].ms.to_numpy() for name in (way, WAYS[0].name))
@@ -137,7 +131,7 @@ def pays_from(costs: "pd.DataFrame", way: str, machine: str) -> float:
     return float(SHADERS[k - 1] + (SHADERS[k] - SHADERS[k - 1]) * -gain[k - 1] / (gain[k] - gain[k - 1]))
 
 
-def _cells(table: "pd.DataFrame", pays: dict[tuple[str, str], float]) -> list[Cell]:
+def _cells(table: pd.DataFrame, pays: dict[tuple[str, str], float]) -> list[Cell]:
     """What is published of ratios, and all else as reported."""
     first = table[table.machine == MACHINES[0]]
     cells = [_ratio(row.way, row.a_quad) for row in first.itertuples()]
@@ -155,7 +149,7 @@ def _ratio(way: str, ours: float) -> Cell:
     return Cell(way, "vertices shaded a quad", "", published=published, ours=ours, status=status)
 
 
-def _notes(table: "pd.DataFrame", pays: dict[tuple[str, str], float]) -> list[str]:
+def _notes(table: pd.DataFrame, pays: dict[tuple[str, str], float]) -> list[str]:
     """The answer, and what it rests on."""
     ratio = table[table.machine == MACHINES[0]].set_index("way").a_quad
     same = table[(table.other_pixels == 0) & (table.way != WAYS[0].name)].way.unique()
@@ -174,7 +168,7 @@ def _notes(table: "pd.DataFrame", pays: dict[tuple[str, str], float]) -> list[st
     ]
 
 
-def _on(machine: str, rows: "pd.DataFrame", pays: dict[tuple[str, str], float]) -> str:
+def _on(machine: str, rows: pd.DataFrame, pays: dict[tuple[str, str], float]) -> str:
     """All ways on one machine."""
     base = rows.loc[WAYS[0].name]
     return (
@@ -197,7 +191,7 @@ def _pays(pays: float) -> str:
     return "never pays here" if math.isinf(pays) else f"pays from {pays:.0f} further instructions a vertex"
 
 
-def _plot(costs: "pd.DataFrame", machine: str, path: "Path") -> None:
+def _plot(costs: pd.DataFrame, machine: str, path: Path) -> None:
     base = costs[costs.way == WAYS[0].name].set_index("shader").ms
     ratio = costs.assign(ratio=[ms / base[extra] for ms, extra in zip(costs.ms, costs.shader, strict=True)])
     lines(

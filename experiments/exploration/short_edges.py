@@ -6,7 +6,10 @@ teapot says what it costs, and a sheet that covers every sample once says what i
 """
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, other_pixels
 from tilestamp.experiments.harness.registry import Progress
@@ -16,11 +19,6 @@ from tilestamp.experiments.studies_shipped.finding import finding, reported
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import wrong_pixels
 from tilestamp.simulator.scenes.scene import Patches, Scene
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What do edge equations in 16 bits spare, and how many samples come out wrong?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -55,8 +53,6 @@ def sheet(edges: str, bound: float) -> Way:
 
 def run(progress: Progress) -> Result:
     """Draw both with each kind of equations at each bound."""
-    import pandas as pd
-
     rows = []
     for bound in BOUNDS:
         progress(f"exploration/short_edges: bound {bound:g}")
@@ -97,7 +93,7 @@ def _row(edges: str, bound: float, machine: str) -> dict[str, Any]:
     }
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     """What is spared, what it costs in samples, and whether it pays."""
     at = table[(table.machine == "h200") & (table.bound == BOUNDS[0])].set_index("edges")
     pixels, samples = SIZE[0] * SIZE[1], SHEET_SIZE[0] * SHEET_SIZE[1]
@@ -126,7 +122,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _fastest(table: "pd.DataFrame") -> str:
+def _fastest(table: pd.DataFrame) -> str:
     """Whether any equations that are loaded are faster than computed ones."""
     plain = table[table.edges == "computed"].set_index(["machine", "bound"]).ms
     gain = [plain[row.machine, row.bound] / row.ms for row in table.itertuples() if row.edges != "computed"]
@@ -134,7 +130,7 @@ def _fastest(table: "pd.DataFrame") -> str:
     return f"{how} computed ones: {min(gain):.3f} to {max(gain):.3f} times as fast."
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table[table.edges != "computed"], path, x="bound", y="wrong", by="edges", log_x=True,
         title="Pixels that differ from those of computed equations", x_label="bound [pixels]", y_label="pixels",

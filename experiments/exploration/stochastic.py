@@ -5,9 +5,11 @@ interval and interleaved from machine code (and on an H200 1.7 to 3.2 times too 
 measured), of their lists by hand.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.frontier.picture_error import flip
@@ -18,10 +20,6 @@ from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
 
 QUESTION = "When do bounds by tile draw motion blur and defocus for less than those by polygon?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -61,8 +59,6 @@ def draw(method: str, edge: float, spp: int = SPP, **blur: Any) -> Run:
 
 def run(progress: Progress) -> Result:
     """Sweep motion and lens by size of polygon; then time against the error of the picture."""
-    import pandas as pd
-
     rows = []
     for edge in EDGES:
         for motion, lens in [(way, 0.0) for way in WAYS] + [(0.0, circle) for circle in CIRCLES]:
@@ -94,10 +90,8 @@ def _row(name: str, edge: float, motion: float, lens: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _pictures() -> "tuple[pd.DataFrame, NDArray[np.uint8]]":
+def _pictures() -> tuple[pd.DataFrame, NDArray[np.uint8]]:
     """FLIP of each method against 128 samples a pixel, by samples; and the converged picture."""
-    import pandas as pd
-
     edge = 8.0
     many = [
         simulate(
@@ -129,7 +123,7 @@ def _single() -> int:
     return int(np.count_nonzero(ids[0] != ids[1]))
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     """Time and efficiency of every run."""
     cells = []
     for r in table.to_dict("records"):
@@ -141,13 +135,13 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     return cells
 
 
-def _best(rows: "pd.DataFrame") -> "pd.Series[float]":
+def _best(rows: pd.DataFrame) -> "pd.Series[float]":
     """Time of the best method of each kind."""
     kind = rows.method.where(~rows.method.str.startswith("tiles"), "tiles")
     return rows.groupby(kind).ms.min()
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     said = []
     for edge, rows in table[table.lens == 0].groupby("edge"):
         best = [_best(rows[rows.motion == way]) for way in (WAYS[0], WAYS[-1])]
@@ -159,7 +153,7 @@ def _answer(table: "pd.DataFrame") -> str:
     )
 
 
-def _notes(table: "pd.DataFrame", pictures: "pd.DataFrame", wrong: int) -> list[str]:
+def _notes(table: pd.DataFrame, pictures: pd.DataFrame, wrong: int) -> list[str]:
     by = table.set_index(["method", "edge", "motion", "lens"])
     still, far = (by.loc[("tiles of 8, intervals", 8.0, way, 0.0)] for way in (0.0, 64.0))
     whole = by.loc[("tiles of 8, whole blur", 8.0, 64.0, 0.0)]
@@ -188,11 +182,11 @@ def _notes(table: "pd.DataFrame", pictures: "pd.DataFrame", wrong: int) -> list[
     ]
 
 
-def _figures(table: "pd.DataFrame", pictures: "pd.DataFrame", image: "NDArray[np.uint8]") -> list[Figure]:
+def _figures(table: pd.DataFrame, pictures: pd.DataFrame, image: NDArray[np.uint8]) -> list[Figure]:
     moving = table[(table.lens == 0) & (table.edge == 8.0)]
     defocused = table[(table.motion == 0) & (table.edge == 8.0)]
 
-    def plot(rows: "pd.DataFrame", x: str, y: str) -> Figure:
+    def plot(rows: pd.DataFrame, x: str, y: str) -> Figure:
         what = {"motion": "motion while the shutter is open [pixels]", "lens": "circle of confusion [pixels]"}[x]
         title, label = {
             "ms": ("Modelled time of a frame, polygons of 8 pixels", "time [ms]"),

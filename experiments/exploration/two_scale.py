@@ -7,9 +7,11 @@ single level. Micropolygons are sorted by one pass of atomics, and most of a fra
 
 from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import SIZE, Way, other_pixels
@@ -21,11 +23,6 @@ from tilestamp.reports.choice_map import choice_map
 from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.run import Run
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "Do tiles in two scales pay for micropolygons, on which GPU, at which bound?"
 SLOW = True  # runs when it is named: tilestamp reproduce exploration
@@ -58,8 +55,6 @@ def way(name: str, bound: float) -> Way:
 
 def run(progress: Progress) -> Result:
     """Draw with every pair of tiles at every bound, and price on every machine."""
-    import pandas as pd
-
     table = pd.DataFrame(_rows(progress))
     best = pd.DataFrame([_best(rows) for _, rows in table.groupby(["machine", "bound"], sort=False)])
     lists = way("masks, 8 in 32", BOUNDS[1]).run("h200").frame.maps["atomics"]
@@ -116,7 +111,7 @@ def _row(run: Run, machine: str, bound: float, family: str, name: str) -> dict[s
     }
 
 
-def _best(rows: "pd.DataFrame") -> dict[str, Any]:
+def _best(rows: pd.DataFrame) -> dict[str, Any]:
     """The best way of each family at one bound on one machine, and by how much the best of two scales gains."""
     of_family = {family: rows[rows.family == family].ms.min() for family in FAMILIES}
     two = min(of_family["masks"], of_family["buckets"])
@@ -131,7 +126,7 @@ def _best(rows: "pd.DataFrame") -> dict[str, Any]:
     }
 
 
-def _notes(table: "pd.DataFrame", best: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame, best: pd.DataFrame) -> list[str]:
     """Where two scales pay, and why not elsewhere."""
     gains = "; ".join(
         f"{machine} {', '.join(f'{gain:.2f}' for gain in rows.gain)}"
@@ -152,7 +147,7 @@ def _notes(table: "pd.DataFrame", best: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _why(rows: "pd.DataFrame", machine: str) -> str:
+def _why(rows: pd.DataFrame, machine: str) -> str:
     """What masks and buckets change at the paper's bound."""
     one = rows[rows.family == "one level"].sort_values("ms").iloc[0]
     masks = rows[rows.family == "masks"].sort_values("ms").iloc[0]
@@ -166,14 +161,14 @@ def _why(rows: "pd.DataFrame", machine: str) -> str:
     )
 
 
-def _plot(best: "pd.DataFrame", path: "Path") -> None:
+def _plot(best: pd.DataFrame, path: Path) -> None:
     lines(
         best, path, x="bound", y="gain", by="machine", log_x=True, title="Best two scales over the best single level",
         x_label="bound [pixels]", y_label="times as fast",
     )  # fmt: skip
 
 
-def _map(best: "pd.DataFrame", path: "Path") -> None:
+def _map(best: pd.DataFrame, path: Path) -> None:
     choice_map(
         best.assign(scene="teapot"),
         path,
@@ -185,7 +180,7 @@ def _map(best: "pd.DataFrame", path: "Path") -> None:
     )
 
 
-def _lists(lists: NDArray[np.int64], path: "Path") -> None:
+def _lists(lists: NDArray[np.int64], path: Path) -> None:
     busy = lists[lists > 0]
     title = f"Grids in the list of each 32x32 tile: {busy.max()} at most, {np.mean(busy):.0f} in the mean"
     heat_map(lists, path, title=title, unit="grids", size=SIZE, tile=32)

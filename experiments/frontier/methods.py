@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.frontier.methods_notes import TIES, notes
 from tilestamp.experiments.frontier.methods_scenes import (
@@ -40,9 +41,6 @@ from tilestamp.reports.methods_plot import panels, side_by_side
 from tilestamp.simulator.reference.picture import SIDE
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "Which method gives the best picture for its time?"
 SOURCE = (
@@ -79,8 +77,6 @@ class Drawn:
 
 def run(progress: Progress) -> Result:
     """Draw every scene by every variant, and compare."""
-    import pandas as pd
-
     rows: list[dict[str, Any]] = []
     worst: dict[str, tuple[float, Drawn]] = {}
     for subject, variants in _grid():
@@ -109,7 +105,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     """The pipelines most often on the front of time and FLIP, with fixed function and without."""
     rows = table[(table.machine == MACHINES[0]) & table.ms.notna()]
     said = []
@@ -174,7 +170,7 @@ def _milliseconds(drawn: Drawn) -> Iterator[tuple[str, float]]:
             yield machine, NO_TIME
 
 
-def _mark_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
+def _mark_fronts(table: pd.DataFrame) -> pd.DataFrame:
     """Add whether anything of a row's scene and machine beats it in both time and error, and anything in software.
 
     Errors are compared in steps of ``TIES``: what nobody can see is no gain.
@@ -189,10 +185,8 @@ def _mark_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
     return table
 
 
-def _doubles(progress: Progress) -> "pd.DataFrame":
+def _doubles(progress: Progress) -> pd.DataFrame:
     """Hits beyond the first of each sample where every edge runs through samples, and samples without a hit."""
-    import pandas as pd
-
     subject = lattice()
     progress("frontier/methods: edges on samples")
     rows = []
@@ -210,7 +204,7 @@ def _doubles(progress: Progress) -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     """Best and cheapest of each scene on the first machine: what the front runs between."""
     cells = []
     for scene, rows in table[table.machine == MACHINES[0]].groupby("scene", sort=False):
@@ -239,14 +233,14 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     return cells
 
 
-def _figures(table: "pd.DataFrame", worst: dict[str, tuple[float, Drawn]]) -> list[Figure]:
+def _figures(table: pd.DataFrame, worst: dict[str, tuple[float, Drawn]]) -> list[Figure]:
     """Fronts by machine and measure, and the pictures that are furthest off."""
     figures = [_front(table, machine, error) for machine in MACHINES for error in MEASURES]
     ranked = sorted(worst.values(), key=lambda kept: -kept[0])[:WORST]
     return figures + [Figure(f"worst-{drawn.variant.pipeline}", partial(_draw_worst, drawn)) for _, drawn in ranked]
 
 
-def _front(table: "pd.DataFrame", machine: str, error: str) -> Figure:
+def _front(table: pd.DataFrame, machine: str, error: str) -> Figure:
     """Time against one measure of error, a panel a scene."""
     rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
     rows = rows[rows.groupby("scene")[error].transform("max") > 0]  # a scene without an error has no front to show

@@ -1,15 +1,14 @@
 """Sentences of the frontier of the methods, all computed from its table."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    import pandas as pd
+import pandas as pd
 
 ONE_STAGE = ("stamps", "across-polygons", "bit-mask")
 TIES = {"flip": 1e-3, "wrong": 1e-5}  # differences that count for nothing: no eye sees so little (assumed)
 
 
-def notes(table: "pd.DataFrame", doubles: "pd.DataFrame") -> list[str]:
+def notes(table: pd.DataFrame, doubles: pd.DataFrame) -> list[str]:
     """Which methods are on a front, which never are and what beats them, and how they err."""
     lines = [_range(table)]
     for machine, rows in table[table.ms.notna()].groupby("machine", sort=False):
@@ -20,7 +19,7 @@ def notes(table: "pd.DataFrame", doubles: "pd.DataFrame") -> list[str]:
     return [*lines, *_one_stage(table), *_pixels(table), *_depths(table), *_doubles(doubles)]
 
 
-def _range(table: "pd.DataFrame") -> str:
+def _range(table: pd.DataFrame) -> str:
     return (
         f"{table.method.nunique()} variants of {table.pipeline.nunique()} pipelines on {table.scene.nunique()} scenes; "
         "every time is modelled, every error is against the exact rasterizer at the same samples, and FLIP against "
@@ -30,7 +29,7 @@ def _range(table: "pd.DataFrame") -> str:
     )
 
 
-def _one_stage(table: "pd.DataFrame") -> list[str]:
+def _one_stage(table: pd.DataFrame) -> list[str]:
     """Studies of one stage say nothing of the time before it."""
     studies = [name for name in ONE_STAGE if name in set(table.pipeline)]
     if not studies:
@@ -42,7 +41,7 @@ def _one_stage(table: "pd.DataFrame") -> list[str]:
     return [sentence]
 
 
-def _on_front(machine: str, rows: "pd.DataFrame") -> str:
+def _on_front(machine: str, rows: pd.DataFrame) -> str:
     """Pipelines on the fronts of time and FLIP, by the number of scenes."""
     drawn = rows.groupby("pipeline").scene.nunique()
 
@@ -56,7 +55,7 @@ def _on_front(machine: str, rows: "pd.DataFrame") -> str:
     )
 
 
-def _dominated(machine: str, rows: "pd.DataFrame") -> list[str]:
+def _dominated(machine: str, rows: pd.DataFrame) -> list[str]:
     """Software that no scene has on the front of software, and what beats each at its best."""
     lines, single = [], []
     soft = rows[~rows.fixed_function]
@@ -71,7 +70,7 @@ def _dominated(machine: str, rows: "pd.DataFrame") -> list[str]:
     return said + [_beaten(machine, best, soft) for best in single]
 
 
-def _beaten(machine: str, best: "pd.Series[Any]", soft: "pd.DataFrame") -> str:
+def _beaten(machine: str, best: "pd.Series[Any]", soft: pd.DataFrame) -> str:
     """A variant of a pipeline that is never on the front, and what beats it where it errs least."""
     rivals = soft[(soft.scene == best.scene) & (soft.ms <= best.ms) & (soft.flip <= best.flip + TIES["flip"])]
     rival = rivals[rivals.software_front_flip].sort_values("ms").iloc[0]
@@ -81,7 +80,7 @@ def _beaten(machine: str, best: "pd.Series[Any]", soft: "pd.DataFrame") -> str:
     )
 
 
-def _pixels(table: "pd.DataFrame") -> list[str]:
+def _pixels(table: pd.DataFrame) -> list[str]:
     """Wrong pixels by pipeline, holes and spills."""
     first = table[(table.machine == table.machine.iloc[0]) & table.wrong.notna()]
     lines = []
@@ -102,7 +101,7 @@ def _pixels(table: "pd.DataFrame") -> list[str]:
     return lines
 
 
-def _depths(table: "pd.DataFrame") -> list[str]:
+def _depths(table: pd.DataFrame) -> list[str]:
     """Depth errors of the formats."""
     first = table[(table.machine == table.machine.iloc[0]) & table.depth_median_ulp.notna()]
     grouped = first.groupby("method", sort=False)[["depth_median_ulp", "depth_worst_ulp"]]
@@ -113,7 +112,7 @@ def _depths(table: "pd.DataFrame") -> list[str]:
     return [f"Depth in units of the last place of its own format, median / worst over all scenes: {named}."]
 
 
-def _doubles(doubles: "pd.DataFrame") -> list[str]:
+def _doubles(doubles: pd.DataFrame) -> list[str]:
     """Double hits where edges run through samples."""
     twice = doubles[doubles.double_hits > 0]
     clean = sorted(set(doubles.method) - set(twice.method))

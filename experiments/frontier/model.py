@@ -6,7 +6,10 @@ Set TILESTAMP_FRONTIER=long for more frames (minutes).
 import time
 from dataclasses import asdict, dataclass
 from math import isnan
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.experiments.frontier.model_frames import Timed, frames, warnings
 from tilestamp.experiments.frontier.model_notes import BOUNDS, COUNTS, FULL, notes
@@ -19,11 +22,6 @@ from tilestamp.models.launch import Launch
 from tilestamp.models.price import Fidelity
 from tilestamp.reports.frontier_plot import frontier
 from tilestamp.simulator.run import Run
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What does a more accurate answer of the simulator cost?"
 SOURCE = (
@@ -54,8 +52,6 @@ class Answer:
 
 def run(progress: Progress) -> Result:
     """Simulate every frame in every way, against the clock."""
-    import pandas as pd
-
     rows: list[dict[str, Any]] = []
     for frame in frames():
         progress(f"frontier/model: {frame.name}")
@@ -81,7 +77,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _answer(ours: "pd.DataFrame") -> str:
+def _answer(ours: pd.DataFrame) -> str:
     """Each method's cost, and its distance from the full run."""
     said = [
         f"{row.method} {row.cpu_seconds:.2f} s ({row.error_against_full:.2%} off)"
@@ -129,7 +125,7 @@ def _rows(frame: Timed, answers: list[Answer]) -> list[dict[str, Any]]:
     ]
 
 
-def _by_method(table: "pd.DataFrame") -> "pd.DataFrame":
+def _by_method(table: pd.DataFrame) -> pd.DataFrame:
     """Mean over the frames: seeds first, so that every frame counts once."""
     frames_ = table.groupby(["method", "frame"], sort=False).mean(numeric_only=True)
     mean = frames_.groupby("method", sort=False).mean()
@@ -137,13 +133,13 @@ def _by_method(table: "pd.DataFrame") -> "pd.DataFrame":
     return mean.assign(worst_against_full=worst.error_against_full).reset_index()
 
 
-def _detailed(instructions: float) -> "pd.DataFrame":
+def _detailed(instructions: float) -> pd.DataFrame:
     """Simulators by others: their published error, and the seconds that their speed means for the mean frame."""
     table = published(__file__, "detailed_simulators")
     return table.assign(seconds=instructions / table.warp_instructions_per_second)
 
 
-def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
+def _cells(ours: pd.DataFrame, theirs: pd.DataFrame) -> list[Cell]:
     """What is drawn, as numbers."""
     shown = {
         "time to simulate a frame": ("cpu_seconds", "CPU s", 1),
@@ -171,16 +167,12 @@ def _cells(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> list[Cell]:
     return cells
 
 
-def _points(ours: "pd.DataFrame", column: str) -> "pd.DataFrame":
-    import pandas as pd
-
+def _points(ours: pd.DataFrame, column: str) -> pd.DataFrame:
     points = {"name": ours.method, "group": EXECUTED, "cost": ours.cpu_seconds, "error": 100 * ours[column]}
     return pd.DataFrame({**points, "published": False}).dropna(subset="error")  # counts have no time
 
 
-def _draw_full(ours: "pd.DataFrame", frames_: int, path: "Path") -> None:
-    import pandas as pd
-
+def _draw_full(ours: pd.DataFrame, frames_: int, path: Path) -> None:
     points = _points(ours, "error_against_full")
     points["front"] = pareto_front(points.cost, points.error)
     again = points.assign(
@@ -194,7 +186,7 @@ def _draw_full(ours: "pd.DataFrame", frames_: int, path: "Path") -> None:
     frontier(path, points, "time to simulate one frame [CPU s]", "mean error of the frame's time [%]", title)
 
 
-def _draw_published(ours: "pd.DataFrame", theirs: "pd.DataFrame", frames_: int, path: "Path") -> None:
+def _draw_published(ours: pd.DataFrame, theirs: pd.DataFrame, frames_: int, path: Path) -> None:
     frontier(
         path,
         _beside(ours, theirs),
@@ -204,10 +196,8 @@ def _draw_published(ours: "pd.DataFrame", theirs: "pd.DataFrame", frames_: int, 
     )
 
 
-def _beside(ours: "pd.DataFrame", theirs: "pd.DataFrame") -> "pd.DataFrame":
+def _beside(ours: pd.DataFrame, theirs: pd.DataFrame) -> pd.DataFrame:
     """Our methods and the simulators by others, with the front over both."""
-    import pandas as pd
-
     drawn = theirs[theirs.seconds.notna()]
     group = [
         "others, error and speed published" if mark == "published" else "others, speed derived"

@@ -1,14 +1,11 @@
 """What the charts of the model's frontier say, in sentences: every number from the run."""
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import pandas as pd
+import pandas as pd
 
 FULL, BOUNDS, COUNTS = (f"{fidelity}, executed" for fidelity in ("schedule", "bounds", "counts"))
 
 
-def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.DataFrame") -> list[str]:
+def notes(table: pd.DataFrame, ours: pd.DataFrame, theirs: pd.DataFrame, beside: pd.DataFrame) -> list[str]:
     """Say what the charts show; every number from the run.
 
     Parameters
@@ -28,7 +25,7 @@ def notes(table: "pd.DataFrame", ours: "pd.DataFrame", theirs: "pd.DataFrame", b
     ]
 
 
-def _about(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
+def _about(table: pd.DataFrame, ours: pd.DataFrame) -> str:
     by = ours.set_index("method")
     full, bounds, counts = by.loc[FULL], by.loc[BOUNDS], by.loc[COUNTS]
     sizes = table[table.method == FULL].instructions / 1e6
@@ -41,12 +38,12 @@ def _about(table: "pd.DataFrame", ours: "pd.DataFrame") -> str:
     )
 
 
-def _off(row: "pd.Series") -> str:
+def _off(row: pd.Series) -> str:
     mean, worst = 100 * row.error_against_full, 100 * row.worst_against_full
     return f"{mean:.2f} % off the full run in the mean, {worst:.2f} % at the worst"
 
 
-def _about_others(ours: "pd.DataFrame", theirs: "pd.DataFrame", beside: "pd.DataFrame") -> list[str]:
+def _about_others(ours: pd.DataFrame, theirs: pd.DataFrame, beside: pd.DataFrame) -> list[str]:
     full = ours.set_index("method").loc[FULL]
     drawn, silent = theirs[theirs.seconds.notna()], theirs[theirs.seconds.isna()]
     direct = int((drawn.speed_mark == "published").sum())

@@ -18,9 +18,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.frontier.sampled_boxes import boxes
 from tilestamp.experiments.harness.registry import Progress
@@ -38,11 +40,6 @@ from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.laine2011.triangle_setup import MAX_SUBTRIANGLES
 from tilestamp.simulator.work import Work
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "Could executing a part of each frame save time?"
 VARIABLE = "TILESTAMP_SAMPLED"
@@ -125,8 +122,6 @@ CHART = Chart(
 
 def run(progress: Progress) -> Result:
     """Run every scene in full, and price its parts."""
-    import pandas as pd
-
     rows: list[dict[str, Any]] = []
     warnings: list[str] = []
     for case in cases():
@@ -219,7 +214,7 @@ def _primitives(full: Run) -> int:
     return counts.get("dice.PATCHES", 0) or counts["triangle_setup.TRIANGLE_LANES"]
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     numbers = {"share of the full run": ("share", "of full", 1), "error": ("error", "%", 100)}
     return [
         Cell(
@@ -231,7 +226,7 @@ def _cells(table: "pd.DataFrame") -> list[Cell]:
     ]  # fmt: skip
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     """What the least part costs."""
     said = [
         f"{method}: {rows.share.min():.0%} to {rows.share.max():.0%} of the full run's CPU seconds at {RATES[0]:.0%}"
@@ -241,7 +236,7 @@ def _answer(table: "pd.DataFrame") -> str:
     return f"At the very best, {'; '.join(said)}; the dearest of these frames takes {full:.2g} CPU seconds in full."
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     least = table[table.rate == RATES[0]]
     once = least.drop_duplicates("scene")
     bound = least[least.method == NUMBERS]
@@ -262,7 +257,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _draw_shares(table: "pd.DataFrame", path: "Path") -> None:
+def _draw_shares(table: pd.DataFrame, path: Path) -> None:
     lines(
         table[(table.rate == RATES[0]) & (table.pipeline == "cudaraster")], path, x="primitives", y="share",
         by="method", title=f"Least cost of a {RATES[0]:.0%} sample, cudaraster", x_label="triangles",

@@ -1,9 +1,11 @@
 """Figure 5: time of each stage over the area of the triangles, synthetic sweep, GTX 480 (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -22,11 +24,7 @@ from tilestamp.experiments.laine2011.sweep import (
     published_ns,
 )
 from tilestamp.reports.fitted_lines import fitted_lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tilestamp.simulator.run import Run
+from tilestamp.simulator.run import Run
 
 QUESTION = "How long does each stage take as triangles grow?"
 WORST_AIM, MEDIAN_AIM = 0.25, 0.08
@@ -35,8 +33,6 @@ COUNTER_AIM = 0.005  # the reference is rounded, and says that its last digits m
 
 def run(progress: Progress) -> Result:
     """Draw the areas that are asked for, and price them."""
-    import pandas as pd
-
     cells: list[Cell] = []
     rows = []
     for area in areas():
@@ -87,7 +83,7 @@ def _answer(rows: list[dict[str, Any]]) -> str:
     return f"The four stages take {' and '.join(said)}."
 
 
-def _bound(made: "Run", stage: str) -> str:
+def _bound(made: Run, stage: str) -> str:
     return str(made.stages.loc[stage, "bound"])
 
 
@@ -153,9 +149,7 @@ def _notes() -> list[str]:
     ]
 
 
-def _draw(cells: Sequence[Cell], path: "Path") -> None:
-    import pandas as pd
-
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     measured = pd.DataFrame([{"area": area, "stage": stage, "ns": ns} for (area, stage), ns in published_ns().items()])
     times = [c for c in cells if c.kind == "time"]
     rows = [{"area": float(c.row.split()[0]), "stage": c.column, "ns": c.ours, "status": c.status} for c in times]

@@ -2,9 +2,9 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -16,9 +16,6 @@ from tilestamp.simulator.scenes import load_scene
 from tilestamp.simulator.scenes.search_path import find_scene
 from tilestamp.simulator.simulation import simulate
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 QUESTION = "What does a further batch cost?"
 SLOW = True  # with what it needs compiled, more than the first run should take
 
@@ -29,8 +26,6 @@ AIM = 0.5
 
 def run(progress: Progress) -> Result:
     """Draw each scene in several batches, and compare what a further batch costs."""
-    import pandas as pd
-
     cells: list[Cell] = []
     rows = []
     for published_name, name in _scenes().items():
@@ -86,7 +81,7 @@ def _times(name: str, batches: int) -> list[dict[str, object]]:
     ]
 
 
-def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Cell]:
+def slope_cells(published_name: str, name: str, ours: pd.DataFrame) -> list[Cell]:
     """Milliseconds of a further batch, by stage."""
     rows = _published(published_name)
     cells = []
@@ -110,18 +105,18 @@ def slope_cells(published_name: str, name: str, ours: "pd.DataFrame") -> list[Ce
     return cells
 
 
-def _published(scene: str) -> "pd.DataFrame":
+def _published(scene: str) -> pd.DataFrame:
     """Rows of the authors' log for one scene."""
     log = published(__file__, "gtx480-cuda40")
     return log[(log["table"] == "figure6") & (log["scene"] == scene) & (log["renderer"] == "CudaRaster")]
 
 
-def slope(x: "np.ndarray[tuple[int], np.dtype[np.int64]]", y: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
+def slope(x: np.ndarray[tuple[int], np.dtype[np.int64]], y: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
     """Least-squares slope of y over x."""
     return float(np.polyfit(x, y, 1)[0])
 
 
-def _draw(table: "pd.DataFrame", scene: str, path: Path) -> None:
+def _draw(table: pd.DataFrame, scene: str, path: Path) -> None:
     rows = _published(scene)
     asked = {(row.key, row.column): row.value for row in rows.itertuples()}
     known = [asked[f"batches={row.batches}", f"{STAGES[row.stage]}_ms"] for row in table.itertuples()]

@@ -10,11 +10,15 @@ vertex is shared.
 """
 
 import os
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
+from tilestamp.experiments.harness.result import Cell
 from tilestamp.experiments.laine2011.heavy_tail import Places, heavy_tail_scene
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
@@ -23,12 +27,6 @@ from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from tilestamp.experiments.harness.result import Cell
 
 MACHINE = "gtx480"
 PIPELINES = ("hardware", "cudaraster", "freepipe")
@@ -170,10 +168,8 @@ def warning() -> str:
     )
 
 
-def draw_times(title: str, cells: "Sequence[Cell]", path: "Path") -> None:
+def draw_times(title: str, cells: Sequence[Cell], path: Path) -> None:
     """Draw times of frames beside the published ones."""
-    import pandas as pd
-
     rows = [{"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status} for c in cells]
     paired_bars(
         pd.DataFrame(rows),

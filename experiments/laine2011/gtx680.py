@@ -1,16 +1,13 @@
 """The sweep of Figure 5 on a GTX 680 beside a GTX 480: the same mixes, another machine file (a prediction)."""
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
 from tilestamp.experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "How would the sweep of Figure 5 run on a GTX 680?"
 SLOW = True  # with what it needs compiled, more than the first run should take
@@ -20,8 +17,6 @@ OTHER = "gtx680"
 
 def run(progress: Progress) -> Result:
     """Price the drawn areas on both machines."""
-    import pandas as pd
-
     cells: list[Cell] = []
     rows = []
     for area in areas():
@@ -66,7 +61,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _draw(table: "pd.DataFrame", path: "Path") -> None:
+def _draw(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

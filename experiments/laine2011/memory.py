@@ -1,7 +1,9 @@
 """Slides: memory of setup data and queues, five scenes (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -10,9 +12,6 @@ from tilestamp.experiments.laine2011.generated import draw, frame_name, scenes, 
 from tilestamp.experiments.laine2011.sweep import SOURCE
 from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 QUESTION = "How much memory do set-up data and queues take?"
 SETUP_AIM, QUEUE_FACTOR = 0.05, 1.5
@@ -80,9 +79,7 @@ def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:
     return Cell(scene, queue, "MB", published=asked, ours=ours, aim=aim, frame=frame_name(scene, WIDTH, HEIGHT))
 
 
-def _draw(cells: Sequence[Cell], path: "Path") -> None:
-    import pandas as pd
-
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     rows = [
         {"cell": f"{c.row} {c.column}", "ours": c.ours, "published": c.published, "status": c.status}
         for c in cells

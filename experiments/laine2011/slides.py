@@ -1,7 +1,10 @@
 """Slides: five scenes, three sizes: hardware, CudaRaster and FreePipe on a GTX 480 (Laine & Karras 2011)."""
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -9,6 +12,7 @@ from tilestamp.experiments.harness.result import Cell, CellFigure, Result
 from tilestamp.experiments.laine2011.generated import (
     PIPELINES,
     VARIABLE,
+    Statistics,
     draw,
     draw_times,
     frame_name,
@@ -18,12 +22,6 @@ from tilestamp.experiments.laine2011.generated import (
 )
 from tilestamp.experiments.laine2011.sweep import SOURCE
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from tilestamp.experiments.laine2011.generated import Statistics
-
 QUESTION = "How do CudaRaster, FreePipe and the hardware pipe compare on five scenes?"
 AIMS = {"hardware": 0.2, "cudaraster": 0.2, "freepipe": 0.3}
 SLOW = True  # with what it needs compiled, more than the first run should take
@@ -31,8 +29,6 @@ SLOW = True  # with what it needs compiled, more than the first run should take
 
 def run(progress: Progress) -> Result:
     """Draw generated scenes by three pipelines."""
-    import pandas as pd
-
     cells: list[Cell] = []
     rows = []
     for scene in scenes():
@@ -73,14 +69,14 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _answer(cells: "Sequence[Cell]") -> str:
+def _answer(cells: Sequence[Cell]) -> str:
     """Ratios of times, from the least to the most."""
     return (
         f"CudaRaster takes {_span(cells, 'SW:HW')} the hardware's time, FreePipe {_span(cells, 'FP:SW')} CudaRaster's."
     )
 
 
-def _span(cells: "Sequence[Cell]", column: str) -> str:
+def _span(cells: Sequence[Cell], column: str) -> str:
     some = [cell for cell in cells if cell.column == column]
     ours, theirs = ([float(getattr(cell, key)) for cell in some] for key in ("ours", "published"))
     return f"{min(ours):.3g} to {max(ours):.3g} times ({min(theirs):.3g} to {max(theirs):.3g} published)"
@@ -107,7 +103,7 @@ def time_cells(scene: str, size: tuple[int, int], ours: dict[str, float], asked:
     return cells
 
 
-def statistic_cells(scene: "Statistics") -> list[Cell]:
+def statistic_cells(scene: Statistics) -> list[Cell]:
     """What the generated scene has of what was asked for, at 1024x768."""
     counters = draw(scene.name, "cudaraster", 1024, 768).frame.facts["counters"]
     visible = 100.0 - counters["TriangleSetup / Viewport cull"] - counters["TriangleSetup / Backface cull"]
@@ -126,5 +122,5 @@ def statistic_cells(scene: "Statistics") -> list[Cell]:
     ]
 
 
-def _draw(pipelines: tuple[str, ...], cells: "Sequence[Cell]", path: "Path") -> None:
+def _draw(pipelines: tuple[str, ...], cells: Sequence[Cell], path: Path) -> None:
     draw_times("Frame time", [cell for cell in cells if cell.column in pipelines], path)

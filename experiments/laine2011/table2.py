@@ -1,16 +1,13 @@
 """Table 2: samples a pixel in three modes, FairyForest and Buddha, GTX 480 (Laine & Karras 2011)."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, CellFigure, Result
 from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, draw_times, everything, frame_name, warning
 from tilestamp.experiments.laine2011.sweep import HEIGHT, SOURCE, WIDTH
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 QUESTION = "What do more samples a pixel cost?"
 SLOW = True  # several frames of a million triangles
@@ -49,7 +46,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _answer(cells: "Sequence[Cell]") -> str:
+def _answer(cells: Sequence[Cell]) -> str:
     """What the most samples take over one, by scene and mode."""
     said = []
     for row in dict.fromkeys(cell.row for cell in cells if cell.unit == "ms"):
@@ -97,5 +94,5 @@ def emits_cell() -> Cell:
     )
 
 
-def _draw(cells: "Sequence[Cell]", path: "Path") -> None:
+def _draw(cells: Sequence[Cell], path: Path) -> None:
     draw_times("Samples a pixel", [cell for cell in cells if cell.unit == "ms"], path)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
@@ -13,13 +13,11 @@ from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Statu
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
 from tilestamp.models.used import note
 from tilestamp.reports.bars import paired_bars
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.scenes.library import STAND_INS
 from tilestamp.simulator.scenes.search_path import find_scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from tilestamp.simulator.run import Run
 
 QUESTION = "What do the stages of a frame of Buddha take, and what does the profiler count?"
 FULL, REDUCED = "happy_vrip", "buddha_100k"  # the authors' mesh of 1,087,716 triangles, and a simplified one
@@ -105,7 +103,7 @@ def reduced_warning() -> str:
     )
 
 
-def counter_cells(made: "Run", status: Status) -> list[Cell]:
+def counter_cells(made: Run, status: Status) -> list[Cell]:
     """Every row of the authors' table but their timers."""
     facts = made.frame.facts
     table = published(__file__, "gtx480-cuda40")
@@ -166,8 +164,6 @@ def counter_cells(made: "Run", status: Status) -> list[Cell]:
 
 
 def _draw(cells: Sequence[Cell], path: Path) -> None:
-    import pandas as pd
-
     rows = [
         {"counter": c.column, "ours": c.ours, "published": c.published, "status": c.status}
         for c in cells

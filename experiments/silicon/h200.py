@@ -4,7 +4,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
+
+import pandas as pd
 
 from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.silicon.inputs import write_inputs
@@ -16,9 +18,6 @@ from tilestamp.models.fitted import names_cell
 from tilestamp.models.machine import load_machine
 from tilestamp.models.used import FITTED, collect
 from tilestamp.reports.bars import paired_bars
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "How far off are times and counters on an H200, on scenes that some number was fitted to?"
 SLOW = True  # with what it needs compiled, more than the first run should take
@@ -87,7 +86,7 @@ def status(targets: list[str], cell: Cell) -> Status:
     return "fitted" if any(names_cell(target, place) for target in targets) else "predicted"
 
 
-def _cells(table: "pd.DataFrame") -> list[Cell]:
+def _cells(table: pd.DataFrame) -> list[Cell]:
     """Times of kernels over 5 microseconds, instructions, and whatever should be exact."""
     shown = table[table.quantity.isin(["instructions", "atomic instructions", TIME])]
     shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]
@@ -116,7 +115,7 @@ def _cell_of(r: _Row) -> Cell:
     return Cell(label, column, unit, published=r.measured, ours=r.ours, aim=r.aim, frame=f"{r.scene} {r.W}")
 
 
-def _figures(table: "pd.DataFrame") -> list[Figure]:
+def _figures(table: pd.DataFrame) -> list[Figure]:
     """Times of the tile raster by tile size, a plot a scene."""
     figures = []
     rows = table[(table.quantity == TIME) & (table.kernel == "k_raster")]
@@ -126,14 +125,14 @@ def _figures(table: "pd.DataFrame") -> list[Figure]:
     return figures
 
 
-def _bars(bars: "pd.DataFrame", scene: str, path: Path) -> None:
+def _bars(bars: pd.DataFrame, scene: str, path: Path) -> None:
     paired_bars(
         bars, path, label="label", ours="ours", published="measured", status="status",
         title=f"Tile raster of {scene} (H200)", unit="us", known="measured",
     )  # fmt: skip
 
 
-def _worst(table: "pd.DataFrame") -> list[str]:
+def _worst(table: pd.DataFrame) -> list[str]:
     """Mean and worst error of the times of each kernel."""
     rows = by_kernel(table)
     rows = rows[rows.quantity == TIME]

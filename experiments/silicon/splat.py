@@ -8,7 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
+
+import pandas as pd
 
 from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.silicon.splat_inputs import MEASURED, PIPELINE, Measured, measured_scenes, read_measured
@@ -22,9 +24,6 @@ from tilestamp.models.price import price
 from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 QUESTION = "How far off are the splat rasterizer's kernels on an H200, and which tile is the fastest?"
 SLOW = True  # draws every measured frame
 
@@ -37,8 +36,6 @@ CLEAR = 0.1  # of the fastest tile's time: measured times that differ by more ar
 
 def run(progress: Callable[[str], None]) -> Result:
     """Draw and price every measured frame."""
-    import pandas as pd
-
     found: list[dict[str, Any]] = []
     scenes, missing = measured_scenes()
     for file, scene in scenes:
@@ -110,10 +107,8 @@ def kernel_names(launches: list[Launch]) -> list[str]:
     return names
 
 
-def fastest_tiles(table: "pd.DataFrame") -> "pd.DataFrame":
+def fastest_tiles(table: pd.DataFrame) -> pd.DataFrame:
     """By scene, screen and rule: the fastest tile, ours and measured, and whether measured times tell it apart."""
-    import pandas as pd
-
     frames = table[table.quantity == FRAME_TIME].copy()
     frames[["width", "tile", "rule"]] = frames.config.str.split(" ", expand=True)
     rows = []
@@ -130,7 +125,7 @@ def fastest_tiles(table: "pd.DataFrame") -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
-def cells(table: "pd.DataFrame") -> list[Cell]:
+def cells(table: pd.DataFrame) -> list[Cell]:
     """Times over 5 us, frames, and instructions."""
     shown = table[table.quantity.isin(["instructions", TIME, FRAME_TIME])]
     shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]
@@ -147,12 +142,12 @@ def _cell(row: dict[str, Any]) -> Cell:
     )
 
 
-def _frames(table: "pd.DataFrame") -> Iterator[tuple[Any, "pd.DataFrame"]]:
+def _frames(table: pd.DataFrame) -> Iterator[tuple[Any, pd.DataFrame]]:
     """Frames of each scene."""
     yield from table[table.quantity == FRAME_TIME].groupby("scene", sort=False)
 
 
-def _bars(rows: "pd.DataFrame", scene: str, path: Path) -> None:
+def _bars(rows: pd.DataFrame, scene: str, path: Path) -> None:
     paired_bars(
         rows.assign(status="predicted"), path, label="config", ours="ours", published="measured", status="status",
         title=f"Frames of {scene} (H200)", unit="us", known="measured",

@@ -10,14 +10,13 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 VARIABLE = "TILESTAMP_SPLATS"
 MEASURED = Path(__file__).parent / "measured" / "splat"
@@ -92,8 +91,6 @@ def measured_scenes() -> tuple[list[tuple[Path, Scene]], list[str]]:
 
 def read_measured(file: Path, scene: Scene) -> Iterator[Measured]:
     """Each configuration of a scene."""
-    import pandas as pd
-
     name = file.name.removesuffix("_scene.json")
     cameras = json.loads(file.read_text("utf-8"))["cameras"]
     stored = file.with_name(f"{name}.csv")
@@ -103,7 +100,7 @@ def read_measured(file: Path, scene: Scene) -> Iterator[Measured]:
         yield Measured(scene, variant, tile, int(width), int(height), camera, *_values(rows))
 
 
-def _values(rows: "pd.DataFrame") -> tuple[dict[str, float], ByKernel, ByKernel]:
+def _values(rows: pd.DataFrame) -> tuple[dict[str, float], ByKernel, ByKernel]:
     """Times, counters and counts; a time measured twice is the mean of both."""
     timed = rows[rows.source.isin(TIMED)]
     times = timed[timed.metric == TIME_METRIC].groupby("kernel").value.mean().to_dict()

@@ -11,6 +11,8 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import pandas as pd
+
 from tilestamp.experiments.harness.result import Result
 from tilestamp.experiments.silicon.textured_compare import SPAN, Drawn, by_kernel, cells, entry, rows, sentences
 from tilestamp.experiments.silicon.textured_inputs import (
@@ -54,8 +56,6 @@ EVENTS = {  # of the sources on a CPU: kernel, metric, ours, how many of ours ar
 
 def run(progress: Callable[[str], None]) -> Result:
     """Draw and price every measured frame."""
-    import pandas as pd
-
     try:
         names = measured_scenes("zh")
     except MissingInputError as missing:

@@ -3,7 +3,9 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
+
+import pandas as pd
 
 from tilestamp.experiments.harness.result import Cell
 from tilestamp.experiments.silicon.textured_inputs import FRAME_METRIC, TIME_METRIC, Measured
@@ -13,9 +15,6 @@ from tilestamp.models.price import price
 from tilestamp.models.timing import Timing
 from tilestamp.models.traffic import traffic
 from tilestamp.simulator.run import Run
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FRAME_TIME = "frame time"  # sum of the kernels and memsets
 SPAN = "frame from start to end"
@@ -103,7 +102,7 @@ def entry(quantity: str, ours: float, theirs: float, aim: float | None, *, absol
     return {"quantity": quantity, "ours": ours, "measured": theirs, "error": error, "aim": aim}
 
 
-def by_kernel(table: "pd.DataFrame") -> "pd.DataFrame":
+def by_kernel(table: pd.DataFrame) -> pd.DataFrame:
     """Ratio of ours to what was measured, mean and range, and mean and worst error, by kernel and quantity."""
     shown = table[(table.quantity != TIME) | (table.measured > SHORTEST_US)]
     shown = shown.assign(ratio=shown.ours / shown.measured, error=shown.error.abs())
@@ -114,7 +113,7 @@ def by_kernel(table: "pd.DataFrame") -> "pd.DataFrame":
     ).reset_index()  # fmt: skip
 
 
-def sentences(table: "pd.DataFrame") -> list[str]:
+def sentences(table: pd.DataFrame) -> list[str]:
     """Mean and worst error of all times, and of each kernel and quantity."""
     times = table[(table.quantity == TIME) & (table.measured > SHORTEST_US)].error.abs()
     whole = f"All {len(times)} times over 5 us: mean error {100 * times.mean():.1f} %, worst {100 * times.max():.0f} %."
@@ -128,7 +127,7 @@ def _sentence(r: dict[Any, Any]) -> str:
     return f"{r['kernel']}, {r['quantity']}: {r['cells']} cells, {ratios}, {errors}."
 
 
-def cells(table: "pd.DataFrame") -> list[Cell]:
+def cells(table: pd.DataFrame) -> list[Cell]:
     """Times over 5 us, frames, and instructions."""
     shown = table[table.quantity.isin(["instructions", TIME, FRAME_TIME, SPAN])]
     shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]

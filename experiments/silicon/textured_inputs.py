@@ -8,16 +8,13 @@ the models may be copied. Without it the experiments that need it say so.
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.models.errors import MissingInputError
 from tilestamp.simulator.scenes.scene import Mesh, Scene
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 VARIABLE = "TILESTAMP_TEXTURED"
 TIME_METRIC = "us_median"
@@ -88,8 +85,6 @@ def measured_scenes(system: str) -> list[str]:
 
 def read_measured(name: str) -> Measured:
     """Read one scene and all that was measured of it."""
-    import pandas as pd
-
     folder = textured_folder()
     table = pd.read_csv(folder / "measured" / f"{name}.csv.gz")
     on_cpu = pd.read_csv(folder / "source_on_cpu" / f"{name}.csv")
@@ -102,7 +97,7 @@ def read_measured(name: str) -> Measured:
     return Measured(name, scene, matrix, width, height, _values(table), events)
 
 
-def _values(table: "pd.DataFrame") -> dict[tuple[str, str, int, str], float]:
+def _values(table: pd.DataFrame) -> dict[tuple[str, str, int, str], float]:
     """Times, counters and what was read back."""
     times = table.source.isin(TIMED) & table.metric.isin([TIME_METRIC, FRAME_METRIC, SPAN_METRIC])
     chosen = table[times | table.source.isin([COUNTED, READ_BACK])]
@@ -110,7 +105,7 @@ def _values(table: "pd.DataFrame") -> dict[tuple[str, str, int, str], float]:
     return {(str(c), str(k), int(i), str(m)): float(v) for (c, k, i, m), v in means.items()}
 
 
-def _mesh(stored: "np.lib.npyio.NpzFile") -> Mesh:
+def _mesh(stored: np.lib.npyio.NpzFile) -> Mesh:
     """Arrays of an input as a mesh."""
     textures = tuple(stored[key] for key in sorted(stored.files) if key.startswith("texture") and key != "texture_ids")
     return Mesh(

@@ -7,6 +7,8 @@ occlusion: every kernel and memset of every configuration that was measured (``t
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import pandas as pd
+
 from tilestamp.experiments.harness.result import Result
 from tilestamp.experiments.silicon.textured_compare import Drawn, by_kernel, cells, rows, sentences
 from tilestamp.experiments.silicon.textured_inputs import VARIABLE, Measured, measured_scenes, read_measured
@@ -36,8 +38,6 @@ CLEARED = {"clear_colors": 12, "clear_fragments": 56}  # bytes a pixel
 
 def run(progress: Callable[[str], None]) -> Result:
     """Draw and price every measured frame."""
-    import pandas as pd
-
     try:
         names = measured_scenes("ru")
     except MissingInputError as missing:

@@ -9,7 +9,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.silicon.inputs import write_inputs
@@ -18,9 +19,6 @@ from tilestamp.experiments.validation.quantities import SHORTEST_US, TIME, WALL
 from tilestamp.experiments.validation.stored import compare, executions
 from tilestamp.experiments.validation.summary import by_kernel, by_scene, fastest_tiles
 from tilestamp.models.machine import load_machine
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "How far off are times and counters on an H200, on scenes that no number was fitted to?"
 SLOW = True  # counts 13 scenes at up to 2048 pixels
@@ -70,7 +68,7 @@ def run(progress: Callable[[str], None]) -> Result:
     )
 
 
-def all_times(table: "pd.DataFrame") -> list[str]:
+def all_times(table: pd.DataFrame) -> list[str]:
     """Mean and worst error of all times over 5 us."""
     times = table[(table.quantity == TIME) & (table.measured > SHORTEST_US)].error.abs()
     return [
@@ -78,7 +76,7 @@ def all_times(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def sentences(kernels: "pd.DataFrame") -> list[str]:
+def sentences(kernels: pd.DataFrame) -> list[str]:
     """Mean and worst error of each kernel and quantity."""
     return [
         f"{r.kernel}{f' at {r.spp} spp' if r.spp else ''}, {r.quantity}: {r.cells} cells, "
@@ -87,7 +85,7 @@ def sentences(kernels: "pd.DataFrame") -> list[str]:
     ]
 
 
-def cells_of(table: "pd.DataFrame") -> list[Cell]:
+def cells_of(table: pd.DataFrame) -> list[Cell]:
     """Times over 5 us, instructions, and what should be exact."""
     shown = table[table.quantity.isin(SHOWN)]
     shown = shown[(shown.quantity != TIME) | (shown.measured > SHORTEST_US)]

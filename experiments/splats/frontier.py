@@ -11,9 +11,12 @@ Without levels on the scene search path the embedded one is all there is, and no
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.registry import Progress
@@ -35,12 +38,6 @@ from tilestamp.simulator.stages.kerbl2023.harmonics import colours_seen
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tiles import tiles_of
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
 QUESTION = "What does an exact picture of splats cost, and which error buys how much time?"
 MACHINE = "h200"
 WIDTH, HEIGHT = 480, 360
@@ -54,8 +51,6 @@ STEP = 255.0  # of a byte
 
 def run(progress: Progress) -> Result:
     """Draw each level by each rule and tile."""
-    import pandas as pd
-
     scenes = levels()
     finest = next(iter(scenes.values()))
     camera = pinhole_camera(finest.views["default"], WIDTH, HEIGHT)
@@ -100,14 +95,14 @@ def levels() -> dict[str, Scene]:
     return found or {EMBEDDED: load_scene(EMBEDDED)}
 
 
-def truth(scene: Scene, camera: Pinhole) -> "NDArray[np.float64]":
+def truth(scene: Scene, camera: Pinhole) -> NDArray[np.float64]:
     """The picture as it is meant."""
     made, splats = drawn(scene, camera), scene.splats
     assert splats is not None  # noqa: S101 - one of splats
     return composed(splats, colours_seen(splats, camera), projected(made), camera, WIDTH, HEIGHT)
 
 
-def by_chance(scene: Scene, camera: Pinhole, exact: "NDArray[np.float64]") -> list[dict[str, float]]:
+def by_chance(scene: Scene, camera: Pinhole, exact: NDArray[np.float64]) -> list[dict[str, float]]:
     """Error of stochastic transparency by samples a pixel."""
     assert scene.splats is not None  # noqa: S101 - one of splats
     colours, on_screen = colours_seen(scene.splats, camera), projected(drawn(scene, camera))
@@ -129,7 +124,7 @@ def projected(made: Run) -> Projected:
 
 
 def points(
-    level: str, scene: Scene, camera: Pinhole, exact: "NDArray[np.float64]", rule: str, tile: int
+    level: str, scene: Scene, camera: Pinhole, exact: NDArray[np.float64], rule: str, tile: int
 ) -> list[dict[str, Any]]:
     """Time and error of one frame in the order of centres, with floats and with half precision."""
     made, masked = (drawn(scene, camera, bound=rule, tile=tile, mask=mask) for mask in (False, True))
@@ -144,7 +139,7 @@ def points(
 
 
 def in_order(
-    level: str, scene: Scene, camera: Pinhole, exact: "NDArray[np.float64]", tile: int, window: int
+    level: str, scene: Scene, camera: Pinhole, exact: NDArray[np.float64], tile: int, window: int
 ) -> dict[str, Any]:
     """Time and error of one frame that sorts at each pixel."""
     made = drawn(scene, camera, bound="ellipse", tile=tile, order="pixel", window=window)
@@ -153,7 +148,7 @@ def in_order(
 
 
 def point(
-    made: Run, exact: "NDArray[np.float64]", tile: int, picture: "NDArray[np.float32] | None" = None
+    made: Run, exact: NDArray[np.float64], tile: int, picture: NDArray[np.float32] | None = None
 ) -> dict[str, Any]:
     """Time and error of a picture: of the frame, or of another one."""
     picture = made.frame.buffers["colours"] if picture is None else picture
@@ -164,7 +159,7 @@ def point(
     }  # fmt: skip
 
 
-def halved(made: Run, scene: Scene, camera: Pinhole, tile: int) -> "NDArray[np.float32]":
+def halved(made: Run, scene: Scene, camera: Pinhole, tile: int) -> NDArray[np.float32]:
     """The picture of the same lists with conics, opacities and colours rounded to 16 bits."""
     assert scene.splats is not None  # noqa: S101 - one of splats
     on_screen, colours = projected(made), colours_seen(scene.splats, camera)
@@ -174,17 +169,17 @@ def halved(made: Run, scene: Scene, camera: Pinhole, tile: int) -> "NDArray[np.f
     return blend(*inputs, threads=tile * tile, counting=False).outputs.colours
 
 
-def half(values: "NDArray[np.float32]") -> "NDArray[np.float32]":
+def half(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Round to 16 bits."""
     return values.astype(np.float16).astype(np.float32)
 
 
-def error(picture: "NDArray[np.floating]", exact: "NDArray[np.float64]") -> float:
+def error(picture: NDArray[np.floating], exact: NDArray[np.float64]) -> float:
     """Root mean square of all channels, in steps of a byte."""
     return STEP * float(np.sqrt(np.mean((picture - exact) ** 2)))
 
 
-def notes(table: "pd.DataFrame", chance: "pd.DataFrame") -> list[str]:
+def notes(table: pd.DataFrame, chance: pd.DataFrame) -> list[str]:
     """Answer first."""
     finest = table[table["level"] == table["level"].iloc[0]]
     plain = finest[(finest["order"] == "centres") & (finest["precision"] == "float")]
@@ -210,7 +205,7 @@ SURE = (
 )
 
 
-def _coarser(table: "pd.DataFrame") -> list[str]:
+def _coarser(table: pd.DataFrame) -> list[str]:
     """What each level of detail buys."""
     best = (
         table[(table["precision"] == "float") & (table["order"] == "centres")]
@@ -229,7 +224,7 @@ def _missing(scenes: dict[str, Scene]) -> list[str]:
     return [f"levels of detail that are not on the scene search path: {', '.join(missing)}"] if missing else []
 
 
-def _draw(table: "pd.DataFrame", title: str, path: "Path") -> None:
+def _draw(table: pd.DataFrame, title: str, path: Path) -> None:
     kind = [rule.partition(", ")[2] or rule for rule in table["rule"]]
     panels(
         table.assign(second=False, kind=kind), path, panel="level", group="kind", x="ms", y="rms", front="front",

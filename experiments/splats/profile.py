@@ -8,6 +8,8 @@ wait for an option; the 49 and 107 million Gaussians of grids 21 and 31 are left
 
 from pathlib import Path
 
+import pandas as pd
+
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.splats.executed import executed
@@ -27,8 +29,6 @@ AIM = 0.2
 
 def run(progress: Progress) -> Result:
     """Draw the garden on each GPU."""
-    import pandas as pd
-
     table = pd.read_csv(PUBLISHED)
     cells, notes = [], []
     for (machine, grid), rows in table.groupby(["machine", "grid"], sort=False):

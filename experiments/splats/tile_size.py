@@ -7,7 +7,9 @@ level of playbot are looked for on the scene search path; where they are not, th
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Figure, Result
@@ -18,9 +20,6 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.library import load_scene
 from tilestamp.simulator.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "Why 16x16 tiles, and not 8 or 32?"
 SLOW = True  # draws every scene by every rule on four GPUs
@@ -39,8 +38,6 @@ CLEAR = 0.1
 
 def run(progress: Progress) -> Result:
     """Draw all of them."""
-    import pandas as pd
-
     scenes, missing = scenes_here()
     rows = on_each(scenes, MACHINES, frames, progress)
     table = pd.DataFrame(rows).merge(measured(), how="left", on=["scene", "machine", "width", "rule", "tile"])
@@ -101,10 +98,8 @@ def frames(name: str, scene: Scene, machine: str) -> Iterator[dict[str, Any]]:
                 }  # fmt: skip
 
 
-def measured() -> "pd.DataFrame":
+def measured() -> pd.DataFrame:
     """Milliseconds of the frames that were measured."""
-    import pandas as pd
-
     found = []
     for scene, file in FILES.items():
         table = pd.read_csv(MEASURED / f"{file}.csv.gz")
@@ -118,10 +113,8 @@ def measured() -> "pd.DataFrame":
     return pd.DataFrame(found)
 
 
-def winners(table: "pd.DataFrame") -> "pd.DataFrame":
+def winners(table: pd.DataFrame) -> pd.DataFrame:
     """The fastest tile of each scene, screen, rule and GPU, and how much longer 16x16 takes."""
-    import pandas as pd
-
     rows = []
     for place, group in table.groupby(["scene", "width", "rule", "machine"], sort=False):
         times = group.set_index("tile").ms
@@ -131,7 +124,7 @@ def winners(table: "pd.DataFrame") -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
-def _answer(best: "pd.DataFrame") -> str:
+def _answer(best: pd.DataFrame) -> str:
     """Where 16x16 is the best, and where not."""
     square, exact = (best[(best.rule == rule) & (best.width == SCREENS[0][0])] for rule in RULES)
     return (
@@ -149,14 +142,14 @@ def _won(row: dict[str, Any]) -> str:
     )
 
 
-def _cells(table: "pd.DataFrame") -> Iterator[Cell]:
+def _cells(table: pd.DataFrame) -> Iterator[Cell]:
     """Frames that were measured."""
     for row in table.dropna(subset=["measured"]).to_dict("records"):
         label = f"{row['scene']} {row['width']} {row['rule']}"
         yield Cell(label, f"tile {row['tile']}", "ms", published=row["measured"], ours=row["ms"], aim=0.2, frame=label)
 
 
-def _figures(table: "pd.DataFrame") -> Iterator[Figure]:
+def _figures(table: pd.DataFrame) -> Iterator[Figure]:
     """By scene and rule on the H200, beside what was measured; and by GPU."""
     wide = table[table.width == SCREENS[0][0]]
     ours = wide[wide.machine == MEASURED_ON]
@@ -168,7 +161,7 @@ def _figures(table: "pd.DataFrame") -> Iterator[Figure]:
         yield Figure(f"gpus-{rule}", partial(_draw, rows.assign(label=rows.machine), None, title))
 
 
-def _draw(rows: "pd.DataFrame", known: str | None, title: str, path: Path) -> None:
+def _draw(rows: pd.DataFrame, known: str | None, title: str, path: Path) -> None:
     lines(
         rows, path, x="tile", y="ms", by="label", title=title, x_label="pixels on a side of a tile",
         y_label="ms a frame", published=known, log_x=True, log_y=True,

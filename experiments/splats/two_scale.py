@@ -6,7 +6,9 @@ precision and segmented sort are not modelled. All cells are predicted.
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Result
@@ -14,9 +16,6 @@ from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
 from tilestamp.experiments.splats.tile_size import SCENES, on_each, scenes_here
 from tilestamp.simulator.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "Do two scales pay: macro tiles to sort, small tiles to blend?"
 SLOW = True  # draws every scene at 4K on three GPUs
@@ -41,8 +40,6 @@ PUBLISHED_ON = "a100"  # the ratios; the growth is published without a GPU that 
 
 def run(progress: Progress) -> Result:
     """Draw all of them."""
-    import pandas as pd
-
     scenes, missing = scenes_here()
     rows = on_each(scenes, MACHINES, frames, progress)
     table = pd.DataFrame(rows)
@@ -73,13 +70,13 @@ def frames(
             }  # fmt: skip
 
 
-def times(table: "pd.DataFrame", screen: str, values: str = "ms") -> "pd.DataFrame":
+def times(table: pd.DataFrame, screen: str, values: str = "ms") -> pd.DataFrame:
     """Milliseconds by scene and GPU, a column a road."""
     rows = table[table.screen == screen]
     return rows.pivot_table(index=["scene", "machine"], columns="road", values=values, sort=False)
 
 
-def _cells(table: "pd.DataFrame") -> Iterator[Cell]:
+def _cells(table: pd.DataFrame) -> Iterator[Cell]:
     """What was published, for each scene."""
     small, large = (times(table, screen) for screen in SCREENS)
     for scene, machine in small.index:
@@ -96,10 +93,8 @@ def _cells(table: "pd.DataFrame") -> Iterator[Cell]:
             )
 
 
-def _answer(table: "pd.DataFrame") -> str:
+def _answer(table: pd.DataFrame) -> str:
     """How often, and by how much."""
-    import pandas as pd
-
     gains = pd.concat([best_of_one(times(table, screen)) for screen in SCREENS])
     lists = pd.concat([by_lists_alone(table, screen) for screen in SCREENS])
     return (
@@ -109,18 +104,18 @@ def _answer(table: "pd.DataFrame") -> str:
     )
 
 
-def by_lists_alone(table: "pd.DataFrame", screen: str) -> "pd.Series[float]":
+def by_lists_alone(table: pd.DataFrame, screen: str) -> "pd.Series[float]":
     """As ``best_of_one``, with the blending of lists of tiles of 8 in place of that of two scales."""
     wide, blend = times(table, screen), times(table, screen, "blend_ms")
     return best_of_one(wide.assign(**{TWO: wide[TWO] - blend[TWO] + blend[SMALL]}))
 
 
-def best_of_one(wide: "pd.DataFrame") -> "pd.Series[float]":
+def best_of_one(wide: pd.DataFrame) -> "pd.Series[float]":
     """How many times as fast two scales are as the better tile of exact lists."""
     return wide[[EXACT, SMALL]].min(axis=1) / wide[TWO]
 
 
-def _notes(table: "pd.DataFrame") -> Iterator[str]:
+def _notes(table: pd.DataFrame) -> Iterator[str]:
     for screen in SCREENS:
         for (scene, machine), gain in best_of_one(times(table, screen)).items():
             row = times(table, screen).loc[(scene, machine)]

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from math import sqrt
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
+
+import pandas as pd
 
 from tilestamp.experiments.harness.result import Cell, Figure, Result
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Scale = Literal["log", "linear", "integer"]
 TOLERANCE = {"log": 0.01, "linear": 0.01, "integer": 1.0}  # ratio - 1; share of the range; units
@@ -111,10 +110,8 @@ def is_monotone(failed: Sequence[bool]) -> bool:
     return list(failed) == sorted(failed)
 
 
-def boundary_table(boundaries: Sequence[Boundary]) -> "pd.DataFrame":
+def boundary_table(boundaries: Sequence[Boundary]) -> pd.DataFrame:
     """One row a boundary, a column a field."""
-    import pandas as pd
-
     return pd.DataFrame([asdict(boundary) for boundary in boundaries])
 
 
@@ -124,7 +121,7 @@ def atlas_result(
     boundaries: Sequence[Boundary],
     figures: Sequence[Figure] = (),
     notes: Sequence[str] = (),
-    tables: "dict[str, pd.DataFrame] | None" = None,
+    tables: dict[str, pd.DataFrame] | None = None,
 ) -> Result:
     """A row, or a family of rows, of the atlas as a result: a cell each for what holds and what breaks.
 

@@ -5,23 +5,19 @@ method has broken where a byte is off by more than its own rounding. Cure: linke
 """
 
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.exploration.transparent_scenes import stack
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "How many transparent layers do fixed lists and k-buffers stand for, and in which order?"
 SIZE, MACHINE = 32, "gtx480"
@@ -39,11 +35,11 @@ EXACT: dict[str, Any] = {"lists": "linked"}
 
 
 @cache
-def _frame(layers: int, front_first: bool, **_: Any) -> "Run":
+def _frame(layers: int, front_first: bool, **_: Any) -> Run:
     return draw(layers, EXACT, front_first=front_first)
 
 
-def draw(layers: int, options: dict[str, Any], *, front_first: bool) -> "Run":
+def draw(layers: int, options: dict[str, Any], *, front_first: bool) -> Run:
     """Draw the layers."""
     scene = stack(SIZE, layers, front_first=front_first)
     return simulate(
@@ -68,8 +64,6 @@ def boundary(method: str, *, front_first: bool) -> tuple[float | None, float | N
 
 def run(progress: Progress) -> Result:
     """Add layers, in both orders."""
-    import pandas as pd
-
     progress("stability/bounded_layers")
     orders = {"nearest first": True, "farthest first": False}
     rows = [
@@ -85,7 +79,7 @@ def run(progress: Progress) -> Result:
     return atlas_result("stability/bounded_layers", title, found, figures, [], {"layers": table})
 
 
-def _boundary(table: "pd.DataFrame", method: str, order: str, front_first: bool) -> Boundary:
+def _boundary(table: pd.DataFrame, method: str, order: str, front_first: bool) -> Boundary:
     worst = table[table["method"] == f"{method}, {order}"].iloc[-1]
     own, lists = (draw(LAYERS[-1], options, front_first=front_first) for options in (METHODS[method], EXACT))
     return Boundary(
@@ -100,7 +94,7 @@ def _boundary(table: "pd.DataFrame", method: str, order: str, front_first: bool)
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table, path, x="layers", y="off", by="method", title="Transparent layers: what bounded methods make of them",
         x_label="layers over a pixel", y_label="worst byte [of 255]",

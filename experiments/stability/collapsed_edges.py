@@ -6,9 +6,10 @@ and so is the normal. Cure: weld such control points once a model, so that the e
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -20,11 +21,6 @@ from tilestamp.simulator.scenes import load_scene
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import bound_and_split
 from tilestamp.simulator.stages.eisenacher2010.dice import dice
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "How short may a patch's edge be before the normal at it is wrong?"
 SIZE = 128  # pixels a side
@@ -92,8 +88,6 @@ def boundary(*, welded: bool = False) -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Let the edge shrink to nothing."""
-    import pandas as pd
-
     progress("stability/collapsed_edges: the pole of a dome")
     rows = [
         {"length": length, "edge": "welded" if welded else "as given", "error": error(length, welded=welded)}
@@ -144,7 +138,7 @@ def _teapot() -> str:
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

@@ -7,9 +7,10 @@ all sub-patches have the same depth. Cures: that same depth, or snapping the fin
 """
 
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -21,9 +22,6 @@ from tilestamp.reports.ste_plots import wrong_pixels
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.snap_edges import Snapped, snap_edges
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "From which bound on are there cracks between neighbours of different depth, and which cure closes them?"
 WIDTH, HEIGHT = 320, 240  # pixels
@@ -92,8 +90,6 @@ def crack_pixels(bound: float, cure: Cure = "as published") -> int:
 
 def run(progress: Progress) -> Result:
     """Sweep the bound, with each cure."""
-    import pandas as pd
-
     rows = []
     for bound in BOUNDS:
         progress(f"stability/cracks: bound {bound:g}")
@@ -150,7 +146,7 @@ def _row(bound: float, cure: Cure) -> dict[str, float | str]:
     }
 
 
-def _boundary(table: "pd.DataFrame", cure: Cure) -> Boundary:
+def _boundary(table: pd.DataFrame, cure: Cure) -> Boundary:
     rows = table[table.cure == cure]
     ends = bracket(list(rows.bound), [n > 0 for n in rows.crack_pixels])
     found = bisect(lambda bound: crack_pixels(bound, cure) > 0, *ends, tolerance=0.1)
@@ -167,7 +163,7 @@ def _boundary(table: "pd.DataFrame", cure: Cure) -> Boundary:
     return Boundary("micropolygon", "bound", "pixels", *found, wrong, "one depth, or snapped edges", cost)
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     """What is left."""
     small = table[(table.cure == "as published") & (table.bound <= 8)]
     left = {cure: int(table[table.cure == cure].crack_pixels.sum()) for cure in CURES}

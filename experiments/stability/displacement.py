@@ -6,9 +6,10 @@ there. Cures: more slots a patch, so many as the displaced box can touch; or a b
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -17,13 +18,7 @@ from tilestamp.experiments.stability.patch_frames import Drawn, draw, flat_patch
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import wrong_pixels
 from tilestamp.simulator.stages.eisenacher2010.dice import Grids
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import Work
 
 QUESTION = "How far may displacement move a sub-patch before it leaves its tiles?"
 WIDTH, HEIGHT = 192, 144  # pixels
@@ -38,7 +33,7 @@ VIEW = np.eye(4)  # clip space
 
 
 @cache
-def grids(bound: float) -> tuple[Grids, "tuple[Work, ...]"]:
+def grids(bound: float) -> tuple[Grids, tuple[Work, ...]]:
     """Dice the plane, not yet displaced."""
     made = split(PLANE, VIEW, WIDTH, HEIGHT, bound=bound)
     return made.grids, tuple(made.works)
@@ -76,8 +71,6 @@ def boundary(bound: float) -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Sweep amplitude at each bound."""
-    import pandas as pd
-
     rows = []
     for bound in BOUNDS:
         progress(f"stability/displacement: bound {bound:g}")
@@ -107,7 +100,7 @@ def _row(bound: float, amplitude: float) -> dict[str, float]:
     }
 
 
-def _boundary(table: "pd.DataFrame", bound: float) -> Boundary:
+def _boundary(table: pd.DataFrame, bound: float) -> Boundary:
     rows = table[table.bound == bound]
     worst = rows.iloc[-1]
     holds, breaks = boundary(bound)
@@ -125,7 +118,7 @@ def _boundary(table: "pd.DataFrame", bound: float) -> Boundary:
     )
 
 
-def _notes(table: "pd.DataFrame") -> list[str]:
+def _notes(table: pd.DataFrame) -> list[str]:
     """Price of slots that nothing needs, and of a smaller bound."""
     spared = table[(table.lost_pixels == 0) & (table.wide_slots_ms > table.four_slots_ms)]
     more = [
@@ -146,7 +139,7 @@ def _notes(table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table.assign(line=table.bound.map(lambda bound: f"bound {bound:g} pixels")),
         path,

@@ -6,7 +6,9 @@ ever. A queue entry of 8 bytes (ours) ends it after 14 halvings, and what is sti
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -15,11 +17,6 @@ from tilestamp.experiments.stability.patch_frames import Split, draw, flat_patch
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import MAX_DEPTH
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "When does splitting a patch across the eye's plane not end?"
 WIDTH, HEIGHT = 96, 64  # pixels
@@ -57,8 +54,6 @@ def empty_pixels(distance: float, near: float = 0.0) -> int:
 
 def run(progress: Progress) -> Result:
     """Come nearer to the floor, with and without a near limit."""
-    import pandas as pd
-
     found = {}
     for depth in DEPTHS:
         progress(f"stability/eye_plane: at most {depth} halvings")
@@ -123,7 +118,7 @@ def _row(distance: float, near: float) -> dict[str, float]:
     }
 
 
-def _holes(rows: "pd.DataFrame") -> str:
+def _holes(rows: pd.DataFrame) -> str:
     """How large the hole is once half the given distance is reached."""
     plain = rows[rows.near == 0]
     sky = int(plain.empty_pixels.min())
@@ -147,9 +142,7 @@ def _ratio(found: dict[int, tuple[float | None, float | None]]) -> float:
     return float((last / first) ** (1 / (DEPTHS[-1] - DEPTHS[0])))
 
 
-def _draw_queue(path: "Path") -> None:
-    import pandas as pd
-
+def _draw_queue(path: Path) -> None:
     shown = [d for d in DISTANCES if d in (0.2, 0.02, 0.002, 0.001, 1e-5)]
     rows = [
         {"pass": k + 1, "length": length, "distance": f"{distance:g} sides"}
@@ -168,7 +161,7 @@ def _draw_queue(path: "Path") -> None:
     )
 
 
-def _draw_depth(table: "pd.DataFrame", path: "Path") -> None:
+def _draw_depth(table: pd.DataFrame, path: Path) -> None:
     table.columns = ["depth", "distance"]
     lines(
         table.assign(line="first distance at which sub-patches are dropped"),

@@ -6,9 +6,10 @@ looks at depth mends all.
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -22,13 +23,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Sampl
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.yao2011.bit_mask import MaskKind, bit_mask
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import Work
 
 QUESTION = "When does the bit mask lose samples of a folded patch?"
 SLOW = True  # the kernels of the bit mask take longer to compile than all else of the atlas
@@ -60,7 +55,7 @@ def strip(fold: float, turn: float) -> Micropolygons:
 
 
 @cache
-def exact(fold: float, turn: float) -> tuple[NDArray[np.int32], "Work"]:
+def exact(fold: float, turn: float) -> tuple[NDArray[np.int32], Work]:
     """Nearest micropolygon of each pixel, without a mask, and the work of that."""
     samples = _samples()
     work = across_polygons(strip(fold, turn), samples, "in-order", simt_of(MACHINE)).works[0]
@@ -68,7 +63,7 @@ def exact(fold: float, turn: float) -> tuple[NDArray[np.int32], "Work"]:
 
 
 @cache
-def masked(fold: float, turn: float, kind: MaskKind) -> tuple[NDArray[np.int32], "Work"]:
+def masked(fold: float, turn: float, kind: MaskKind) -> tuple[NDArray[np.int32], Work]:
     """The same under a mask, and its work."""
     samples = _samples()
     work = bit_mask(strip(fold, turn), samples, kind, simt_of(MACHINE).warp, simt_of(MACHINE)).works[0]
@@ -94,8 +89,6 @@ def _samples() -> Samples:
 
 def run(progress: Progress) -> Result:
     """Fold the strip, seen from several sides, under each mask."""
-    import pandas as pd
-
     rows = []
     for turn in TURNS:
         progress(f"stability/folds: turned by {turn} degrees")
@@ -115,7 +108,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _draw_maps(table: "pd.DataFrame", path: "Path") -> None:
+def _draw_maps(table: pd.DataFrame, path: Path) -> None:
     maps = {
         f"{kind} mask": table[table["mask"] == kind].pivot_table(index="turn", columns="fold", values="wrong")
         for kind in KINDS
@@ -157,7 +150,7 @@ def _notes() -> list[str]:
     return [f"Folded by {fold} degrees, {one}, takes " + ", ".join(costs) + "."]
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     shown = table[table.turn == 0]
     lines(
         shown.assign(percent=100 * shown.wrong),

@@ -12,9 +12,10 @@ plane. All corners are multiples of 1/16 pixel, and all other edges lie off the 
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -24,9 +25,6 @@ from tilestamp.experiments.stability.clipping import PIPELINES, by_pipeline
 from tilestamp.experiments.stability.methods import MACHINE, draw
 from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "When does clipping one of two neighbours leave holes between them?"
 SIZE = 64  # pixels
@@ -151,10 +149,8 @@ def _row(method: str, case: Case, cost: str) -> Boundary:
     return Boundary(method, case.parameter, case.unit, holds, breaks, wrong, CURE, cost)
 
 
-def inside_box() -> "pd.DataFrame":
+def inside_box() -> pd.DataFrame:
     """Holes of each method: views that have any, and pixels."""
-    import pandas as pd
-
     rows = []
     scenes = views(VIEWS // 2, 1) + views(VIEWS // 2, 2)
     for method, mask in METHODS.items():

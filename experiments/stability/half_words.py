@@ -6,23 +6,18 @@ for no order, so every run shows the same wrong colour.
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "When does FreePipe show colours that no triangle has?"
 SIZE = 128  # pixels a side
@@ -33,7 +28,7 @@ COLORS = ((1.0, 0.0, 0.5, 1.0), (0.9, 0.9, 0.1, 1.0))  # each has one smaller ha
 
 
 @cache
-def frame(gap: float, packing: str) -> "Run":
+def frame(gap: float, packing: str) -> Run:
     """Two tilted sheets of two colours, ``gap`` apart."""
     corners = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
     positions = np.ones((8, 4), np.float32)
@@ -58,8 +53,6 @@ def boundary(packing: str = "32") -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Bring the sheets together."""
-    import pandas as pd
-
     progress("stability/half_words: two sheets")
     rows = [
         {"gap": gap, "packing": f"{packing} bits", "mixed": 100 * mixed_pixels(gap, packing) / SIZE**2}
@@ -86,7 +79,7 @@ def run(progress: Progress) -> Result:
     return atlas_result("stability/half_words", "FreePipe's half words", boundaries, figures, notes, {"gaps": table})
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

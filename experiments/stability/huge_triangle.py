@@ -5,9 +5,10 @@ tiles divides the same pixels among all blocks, at the price of its four kernels
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -15,11 +16,6 @@ from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bis
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "How large may one triangle be before FreePipe waits for it alone?"
 SIDE = 1024  # pixels of the screen
@@ -48,8 +44,6 @@ def overtaken(rival: str) -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Let one triangle grow."""
-    import pandas as pd
-
     rows = []
     for pipeline in PIPELINES:
         progress(f"stability/huge_triangle: {pipeline}")
@@ -91,7 +85,7 @@ def _notes() -> list[str]:
     ]
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

@@ -5,25 +5,20 @@ first four found are kept: the list has the newest first. Cure: no limit, as man
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.experiments.stability.layers import layered
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.zhang2025.pixel_shader import FRAGMENT_OUT_BYTES, OVERDRAW
 from tilestamp.simulator.stages.zhang2025.rop import KEPT
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "How many layers do four fragments a pixel stand for?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
@@ -37,7 +32,7 @@ MACHINE = "rtx3080"
 
 
 @cache
-def frame(layers: int, order: str, limit: int = KEPT) -> "Run":
+def frame(layers: int, order: str, limit: int = KEPT) -> Run:
     """Draw the layers, transparent where the order is ``oit``."""
     opacity = OPACITY if order == "oit" else 1.0
     scene = layered(layers, CELLS, ORDERS[order], opacity)
@@ -68,8 +63,6 @@ def stream_boundary() -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Add layers."""
-    import pandas as pd
-
     rows = []
     for layers in LAYERS:
         progress(f"stability/kept_fragments: {layers} layers")
@@ -97,7 +90,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def _boundary(table: "pd.DataFrame", order: str) -> Boundary:
+def _boundary(table: pd.DataFrame, order: str) -> Boundary:
     rows = table[table.order == order]
     last = rows.iloc[-1]
     return Boundary(
@@ -112,7 +105,7 @@ def _boundary(table: "pd.DataFrame", order: str) -> Boundary:
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

@@ -6,9 +6,10 @@ for all lanes of a warp that want it does.
 """
 
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -18,11 +19,6 @@ from tilestamp.experiments.stability.patch_frames import milliseconds, simt_of
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.tile_range import screen_tiles
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What does it cost when all patches want the same bucket?"
 PATCHES = 40_000
@@ -65,8 +61,6 @@ def _slow(share: float, machine: str, variant: str) -> bool:
 
 def run(progress: Progress) -> Result:
     """Sweep the share on two machines, with both cures."""
-    import pandas as pd
-
     rows = []
     for machine in MACHINES:
         progress(f"stability/one_counter: {machine}")
@@ -110,7 +104,7 @@ def _notes() -> list[str]:
     return notes
 
 
-def _plot(table: "pd.DataFrame", machine: str, path: "Path") -> None:
+def _plot(table: pd.DataFrame, machine: str, path: Path) -> None:
     lines(
         table[table.share > 0],
         path,

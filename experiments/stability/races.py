@@ -7,9 +7,9 @@ shows in what share of the runs a pixel is wrong.
 
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -18,10 +18,8 @@ from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bis
 from tilestamp.experiments.stability.layers import layered
 from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from tilestamp.simulator.run import Run
 
 QUESTION = "From how many layers on do unordered writes leave wrong pixels?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
@@ -36,7 +34,7 @@ MACHINE = "gt750m"  # Ru's
 
 
 @cache
-def frame(layers: int, seed: int) -> "Run":
+def frame(layers: int, seed: int) -> Run:
     """Draw the layers in one order of the warps."""
     return simulate(layered(layers, CELLS, seed), "per-primitive", MACHINE, width=SIZE, height=SIZE)
 
@@ -62,8 +60,6 @@ def boundary(seeds: int = SEEDS) -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Draw more and more layers in many orders."""
-    import pandas as pd
-
     rows = []
     for layers in LAYERS:
         progress(f"stability/races: {layers} layers, {SEEDS} orders")

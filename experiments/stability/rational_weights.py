@@ -6,9 +6,10 @@ surface, column k times ``alpha**k``, so that both ends move equally fast; once 
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -16,11 +17,6 @@ from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.experiments.stability.patch_frames import Split, draw, flat_patch, milliseconds, split
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "How small may a weight be before a rational patch is diced badly?"
 SIZE = 40  # pixels a side of the screen
@@ -71,8 +67,6 @@ def boundary(depth: int = DEPTHS[-1], *, balanced: bool = False) -> tuple[float 
 
 def run(progress: Progress) -> Result:
     """Take weight from one edge."""
-    import pandas as pd
-
     progress("stability/rational_weights: one edge lighter and lighter")
     rows = [_row(weight, cure) for cure in CURES for weight in WEIGHTS]
     table = pd.DataFrame(rows)
@@ -114,7 +108,7 @@ def _row(weight: float, cure: str) -> dict[str, float | str]:
     }
 
 
-def _boundary(table: "pd.DataFrame", cure: str) -> Boundary:
+def _boundary(table: pd.DataFrame, cure: str) -> Boundary:
     rows = table[table.cure == cure]
     plain, cured = (table[(table.cure == c) & (table.weight == 1)].iloc[0].ms for c in CURES)
     given = cure == "as given"
@@ -129,7 +123,7 @@ def _boundary(table: "pd.DataFrame", cure: str) -> Boundary:
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path", column: str, label: str) -> None:
+def _plot(table: pd.DataFrame, path: Path, column: str, label: str) -> None:
     lines(
         table,
         path,

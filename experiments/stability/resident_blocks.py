@@ -5,7 +5,9 @@ cannot process model have more than 10k". The limit is the machine's, not the me
 of the two grid synchronisations have none.
 """
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -14,11 +16,6 @@ from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.occupancy import residency
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import BLOCK, REGISTERS, SLOTS_A_TRIANGLE
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "How many triangles can a compaction take whose blocks must all be resident?"
 MACHINES = ("ga104", "rtx3080", "h200")  # cooperative launches need compute capability 6.0
@@ -40,8 +37,6 @@ def boundary(machine: Machine, registers: int = REGISTERS) -> tuple[float | None
 
 def run(progress: Progress) -> Result:
     """Ask every machine that can launch it."""
-    import pandas as pd
-
     progress("stability/resident_blocks: machines")
     rows = [
         {"machine": name, "registers": registers, "triangles": boundary(load_machine(name), registers)[0]}
@@ -71,7 +66,7 @@ def _boundary(name: str) -> Boundary:
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

@@ -6,9 +6,11 @@ segments of bins and of tiles, where few triangles cover many of them.
 """
 
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from tilestamp.experiments.harness.registry import Progress
@@ -22,13 +24,7 @@ from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
 from tilestamp.simulator.stages.laine2011.triangle_setup import SLACK, triangle_setup
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import Work
 
 QUESTION = "When do CudaRaster's queues overflow, and what does drawing again cost?"
 SIZE = 512  # pixels a side: 16 bins, 4096 tiles
@@ -43,7 +39,7 @@ class Attempt(NamedTuple):
 
     needed: dict[str, int]
     room: dict[str, int]
-    works: "tuple[Work, ...]"
+    works: tuple[Work, ...]
 
     def overflows(self, queue: str) -> bool:
         """Whether a queue is too small."""
@@ -88,8 +84,6 @@ def boundary(queue: str) -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Add triangles until a queue is full."""
-    import pandas as pd
-
     rows = []
     for count in COUNTS:
         progress(f"stability/retries: {count} triangles")
@@ -147,7 +141,7 @@ def frame(count: int) -> Run:
     )
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

@@ -5,9 +5,11 @@ that end before the Gaussian does, order by the depths of centres, a near plane 
 bits, determinants that round to zero, and one thread for however many tiles.
 """
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
 from tilestamp.experiments.harness.registry import Progress
@@ -22,11 +24,6 @@ from tilestamp.simulator.scenes.splat_view import perspective
 from tilestamp.simulator.simulation import simulate
 from tilestamp.simulator.stages.kerbl2023.project import project
 from tilestamp.simulator.stages.kerbl2023.tiles import tiles_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "Where do splats by tile lists show a wrong picture, or none?"
 MACHINE = "h200"
@@ -122,8 +119,6 @@ def waits(scale: float, bound: str = "square") -> float:
 
 def run(progress: Progress) -> Result:
     """Turn each until it breaks."""
-    import pandas as pd
-
     progress("stability/splats: opacities")
     rows = [{"tile": f"{tile}x{tile}", "opacity": o, "cut": cut(o, tile)} for tile in (4, 16) for o in OPACITIES]
     table = pd.DataFrame(rows)
@@ -167,7 +162,7 @@ def boundaries() -> list[Boundary]:
     ]  # fmt: skip
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table,
         path,

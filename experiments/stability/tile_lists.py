@@ -5,24 +5,19 @@ beyond is lost here (in the original it overwrites the next tile's list). Cure: 
 """
 
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
 from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect
 from tilestamp.experiments.stability.layers import VIEW
 from tilestamp.reports.plots import lines
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
-
-    from tilestamp.simulator.run import Run
 
 QUESTION = "When do Ru's tile lists overflow?"
 SLOW = True  # the kernels of this pipeline are compiled for nothing else in the first run
@@ -51,7 +46,7 @@ def model(count: int, crowd: int) -> Scene:
 
 
 @cache
-def frame(count: int, crowd: int, capacity: str = "original") -> "Run":
+def frame(count: int, crowd: int, capacity: str = "original") -> Run:
     """Draw with the original's room, or with room counted first."""
     return simulate(model(count, crowd), "tiled", MACHINE, width=SIZE, height=SIZE, capacity=capacity)
 
@@ -78,8 +73,6 @@ def count_boundary() -> tuple[float | None, float | None]:
 
 def run(progress: Progress) -> Result:
     """Crowd one tile."""
-    import pandas as pd
-
     rows = []
     for share in SHARES:
         progress(f"stability/tile_lists: {share:.0%} in one tile")
@@ -115,7 +108,7 @@ def run(progress: Progress) -> Result:
     return atlas_result("stability/tile_lists", "Fixed tile lists", boundaries, figures, [], {"shares": table})
 
 
-def _plot(table: "pd.DataFrame", path: "Path") -> None:
+def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
         table.melt("share", var_name="what", value_name="count"),
         path,

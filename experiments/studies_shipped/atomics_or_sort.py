@@ -6,9 +6,10 @@ at random in squares of fewer and fewer pixels.
 """
 
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result
@@ -17,11 +18,6 @@ from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes import Scene
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "At how many layers do atomics lose to sorting?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
@@ -76,12 +72,12 @@ def piled(side: int) -> Scene:
     return Scene.from_clip_space(positions.reshape(-1, 4).astype(np.float32), order, f"pile in {side} px")
 
 
-def notes(table: "pd.DataFrame", crossings: list[Boundary]) -> list[str]:
+def notes(table: pd.DataFrame, crossings: list[Boundary]) -> list[str]:
     """Say which is faster where, and what more layers cost each."""
     return [_machine(str(machine), rows, crossings) for machine, rows in table.groupby("machine", sort=False)]
 
 
-def _machine(machine: str, rows: "pd.DataFrame", crossings: list[Boundary]) -> str:
+def _machine(machine: str, rows: pd.DataFrame, crossings: list[Boundary]) -> str:
     mine = [cross for cross in crossings if cross.place["machine"] == machine]
     where = "; ".join(f"{one.before} is faster up to {one.at:.3g} layers, then {one.after}" for one in mine)
     fewest = rows[rows["layers"] == rows["layers"].min()].set_index("method")["milliseconds"]
@@ -91,13 +87,13 @@ def _machine(machine: str, rows: "pd.DataFrame", crossings: list[Boundary]) -> s
     )
 
 
-def _grown(rows: "pd.DataFrame", name: str) -> str:
+def _grown(rows: pd.DataFrame, name: str) -> str:
     first, last = rows.loc[rows["layers"].idxmin()], rows.loc[rows["layers"].idxmax()]
     ratio = last["milliseconds"] / first["milliseconds"]
     return f"{name} takes {ratio:.2g} times as long ({first['bound']}, then {last['bound']})"
 
 
-def _draw(table: "pd.DataFrame", path: "Path") -> None:
+def _draw(table: pd.DataFrame, path: Path) -> None:
     times = table.pivot_table("milliseconds", ["machine", "layers"], "method", sort=False)
     ratios = times.drop(columns=SORT).div(times[SORT], axis=0)
     ratio = ratios.reset_index().melt(["machine", "layers"], var_name="method", value_name="ratio")

@@ -8,9 +8,11 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.frontier.methods_scenes import sheets
 from tilestamp.experiments.harness.registry import Progress
@@ -22,11 +24,6 @@ from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, repo
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.reports.tornado import tornado
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What else could the area of an H200 be spent on, to draw faster?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
@@ -52,8 +49,6 @@ Design = Mapping[str, float]
 
 def run(progress: Progress) -> Result:
     """Take steps until none gains, then price the design on frames that it was not made for."""
-    import pandas as pd
-
     steps = pd.DataFrame(descend(study_of(DESIGNED_ON), progress))
     tried, taken = steps, steps[steps["taken"]]
     last = taken.iloc[-1]
@@ -140,7 +135,7 @@ def _gain(name: str, design: Design) -> float:
     return float(times[1] / times[0])
 
 
-def notes(taken: "pd.DataFrame", frames: Mapping[str, float]) -> list[str]:
+def notes(taken: pd.DataFrame, frames: Mapping[str, float]) -> list[str]:
     """Say which steps were taken, what the design is, and whether it holds elsewhere."""
     first, last = taken.iloc[0], taken.iloc[-1]
     steps = ", then ".join(
@@ -158,10 +153,8 @@ def notes(taken: "pd.DataFrame", frames: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _draw(tried: "pd.DataFrame", path: "Path") -> None:
+def _draw(tried: pd.DataFrame, path: Path) -> None:
     """Draw what each move would do to the time, at each step."""
-    import pandas as pd
-
     rows = []
     for step, moves in tried[tried["step"] > 0].groupby("step"):
         for name, factors in MOVES.items():
@@ -173,6 +166,6 @@ def _draw(tried: "pd.DataFrame", path: "Path") -> None:
     tornado(pd.DataFrame(rows), path, panel="step", label="number", title=title, least=0.0)
 
 
-def _least(moves: "pd.DataFrame", name: str, factor: float) -> float:
+def _least(moves: pd.DataFrame, name: str, factor: float) -> float:
     """Least time of a move over that before it, whatever makes up for the area; NaN where it cannot be made."""
     return float(moves.loc[moves["move"].str.startswith(f"{name} x {factor:g},"), "gain"].min())

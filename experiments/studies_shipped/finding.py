@@ -1,20 +1,18 @@
 """What shipped studies and roads not taken say, and how: numbers and sentences are computed from the run."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
 from tilestamp.experiments.studies.study import Study
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 SOURCE = "tilestamp's own runs: nothing published stands beside these numbers"
 WHAT_IF = "what-if: machines with changed numbers do not exist, and their numbers are assumed"
 
 
-def table_of(study: Study, progress: Progress) -> "pd.DataFrame":
+def table_of(study: Study, progress: Progress) -> pd.DataFrame:
     """Run a study in this process; its table."""
     study.run(jobs=1, say=lambda how_far: progress(f"{study.title}: {how_far}"))
     return study.table()
@@ -26,7 +24,7 @@ def finding(
     cells: Sequence[Cell],
     figures: Sequence[Figure],
     notes: Sequence[str],
-    tables: Mapping[str, "pd.DataFrame"],
+    tables: Mapping[str, pd.DataFrame],
     warnings: Sequence[str] = (),
     charts: Sequence[Chart] = (),
     folder: str = "studies_shipped",

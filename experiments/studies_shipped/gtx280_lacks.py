@@ -6,9 +6,10 @@ Eisenacher & Loop 2010: the killeroo at 1600x1200, for which the paper chose til
 
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, MACHINE, frame, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
@@ -18,11 +19,6 @@ from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, repo
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, altered, load_machine
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "Which number of the GTX 280, changed alone, would have made another tile size the best?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
@@ -40,8 +36,6 @@ CHART = Chart(
 
 def run(progress: Progress) -> Result:
     """Scan each number with three tile sizes."""
-    import pandas as pd
-
     scanned = machines()
     parts = []
     for tile in TILES:
@@ -93,7 +87,7 @@ def nearest(changes: list[Boundary], usual: int) -> dict[tuple[str, int], float]
     return found
 
 
-def _usual(now: "pd.DataFrame", scanned: int, usual: int) -> str:
+def _usual(now: pd.DataFrame, scanned: int, usual: int) -> str:
     told = ", ".join(f"{row.milliseconds:.1f} ms with {row.tile}x{row.tile}" for row in now.itertuples())
     return f"As it was, {usual}x{usual} is the fastest: {told}; {scanned} numbers were scanned."
 
@@ -108,7 +102,7 @@ def _sentence(needed: dict[tuple[str, int], float], usual: int, tile: int) -> st
     return f"{tile}x{tile} instead of {usual}x{usual} needs one of {len(factors)} numbers changed: {told}{more}."
 
 
-def _draw(table: "pd.DataFrame", needed: dict[tuple[str, int], float], usual: int, tile: int, path: "Path") -> None:
+def _draw(table: pd.DataFrame, needed: dict[tuple[str, int], float], usual: int, tile: int, path: Path) -> None:
     """Draw the time of a tile over that of the usual one, by factor, for the numbers that need the least change."""
     near = [number for number, other in needed if other == tile][:MOST_LINES]
     times = table[table["number"].isin(near or list(table["number"].unique())[:MOST_LINES])]

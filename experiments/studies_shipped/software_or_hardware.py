@@ -1,7 +1,9 @@
 """Where software meets hardware: CudaRaster against the fixed-function pipe over the size of triangles."""
 
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from tilestamp.experiments.frontier.methods_scenes import sheets
 from tilestamp.experiments.harness.registry import Progress
@@ -10,11 +12,6 @@ from tilestamp.experiments.questions.best import Boundary, boundaries
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
 from tilestamp.reports.plots import lines
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "For which sizes of triangles is software as fast as hardware?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
@@ -48,13 +45,13 @@ def run(progress: Progress) -> Result:
     return finding("software_or_hardware", title, cells, [figure], notes(ratios, crossings), {"times": table})
 
 
-def ratio_table(table: "pd.DataFrame") -> "pd.DataFrame":
+def ratio_table(table: pd.DataFrame) -> pd.DataFrame:
     """Time of software over that of hardware, a row a machine and size."""
     times = table.pivot_table("milliseconds", ["machine", "area"], "pipeline", sort=False)
     return (times[SOFTWARE] / times[HARDWARE]).rename("ratio").reset_index()
 
 
-def notes(ratios: "pd.DataFrame", crossings: list[Boundary]) -> list[str]:
+def notes(ratios: pd.DataFrame, crossings: list[Boundary]) -> list[str]:
     """Say where they cross on each machine, and how far apart they are at both ends."""
     return [
         *(_machine(str(machine), rows, crossings) for machine, rows in ratios.groupby("machine", sort=False)),
@@ -63,7 +60,7 @@ def notes(ratios: "pd.DataFrame", crossings: list[Boundary]) -> list[str]:
     ]
 
 
-def _machine(machine: str, rows: "pd.DataFrame", crossings: list[Boundary]) -> str:
+def _machine(machine: str, rows: pd.DataFrame, crossings: list[Boundary]) -> str:
     ends = rows.sort_values("area").iloc[[0, -1]]
     told = ", ".join(f"{row.ratio:.2g} times at {row.area:g} px" for row in ends.itertuples())
     mine = [cross for cross in crossings if cross.place["machine"] == machine]
@@ -72,7 +69,7 @@ def _machine(machine: str, rows: "pd.DataFrame", crossings: list[Boundary]) -> s
     return f"{machine}: {where or f'{always} is faster at every size'} (software takes {told} what hardware takes)."
 
 
-def _closest(ratios: "pd.DataFrame") -> str:
+def _closest(ratios: pd.DataFrame) -> str:
     row = ratios.loc[ratios["ratio"].idxmin()]
     return (
         f"Software comes closest on {row['machine']} at {row['area']:g} px: fixed function at"
@@ -80,7 +77,7 @@ def _closest(ratios: "pd.DataFrame") -> str:
     )
 
 
-def _draw(ratios: "pd.DataFrame", path: "Path") -> None:
+def _draw(ratios: pd.DataFrame, path: Path) -> None:
     lines(
         ratios, path, x="area", y="ratio", by="machine", log_x=True, log_y=True,
         title="CudaRaster against fixed function: below 1 software is faster",

@@ -1,6 +1,8 @@
 """Tile size against zoom and bound, on all machines: which tile of the micropolygon pipeline is the fastest where."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Chart, Figure, Result
@@ -8,9 +10,6 @@ from tilestamp.experiments.questions import answers
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
 from tilestamp.models.machine import list_machines
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 QUESTION = "Which tile size is the fastest, on which machine, at which zoom and bound?"
 SLOW = True  # runs when it is named: tilestamp reproduce studies
@@ -44,7 +43,7 @@ def run(progress: Progress) -> Result:
     )
 
 
-def notes(best: "pd.DataFrame", table: "pd.DataFrame") -> list[str]:
+def notes(best: pd.DataFrame, table: pd.DataFrame) -> list[str]:
     """Say which tile is the best where, and what the wrong one costs."""
     counts = best["best"].value_counts()
     told = ", ".join(f"{tile}x{tile} at {count}" for tile, count in counts.items())
@@ -55,7 +54,7 @@ def notes(best: "pd.DataFrame", table: "pd.DataFrame") -> list[str]:
     ]
 
 
-def _where(best: "pd.DataFrame", tile: int) -> str:
+def _where(best: pd.DataFrame, tile: int) -> str:
     """Where a tile that is not the usual one is the best."""
     rows = best[best["best"] == tile]
     clear = rows.loc[rows["margin"].idxmax()]
@@ -69,7 +68,7 @@ def _where(best: "pd.DataFrame", tile: int) -> str:
     )
 
 
-def _cost(best: "pd.DataFrame", table: "pd.DataFrame", tile: int) -> str:
+def _cost(best: pd.DataFrame, table: pd.DataFrame, tile: int) -> str:
     """What it costs to take one tile everywhere."""
     places = ["bound", "zoom", "machine"]
     joined = table[table["tile"] == tile].merge(best, on=places, suffixes=("", "_best"))

@@ -5,9 +5,11 @@ The frame is executed once; each machine only prices it. The page has a slider f
 
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Chart, Figure, Result
@@ -16,11 +18,6 @@ from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.picture import picture
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 QUESTION = "What would more SMs, a faster clock or more bandwidth do to a frame, stage by stage?"
 SCENE, PIPELINE, MACHINE, SIZE = "teapot", "micropolygon", "gtx280", (800, 600)
@@ -49,10 +46,8 @@ def run(progress: Progress) -> Result:
     return finding("what_if", title, cells, figures, notes(now, doubled), tables, [WHAT_IF], charts(made))
 
 
-def priced(made: Run) -> "pd.DataFrame":
+def priced(made: Run) -> pd.DataFrame:
     """Milliseconds of each stage on each machine, and the term that holds in the longest launch of the stage."""
-    import pandas as pd
-
     factors = pd.DataFrame(product(FACTORS, repeat=len(NUMBERS)), columns=list(NUMBERS))
     numbers = {number: factors[name] * made.machine.number(number) for name, number in NUMBERS.items()}
     numbers[NUMBERS["SMs"]] = numbers[NUMBERS["SMs"]].round().astype(int)
@@ -73,10 +68,8 @@ def twice(times: "pd.Series[float]") -> dict[str, float]:
     return {name: float(times[at]) for name, at in {**alone, "all three": (2.0, 2.0, 2.0)}.items()}
 
 
-def tiles(made: Run) -> "pd.DataFrame":
+def tiles(made: Run) -> pd.DataFrame:
     """Sample tests of each tile that has any; rows count from the top of the screen."""
-    import pandas as pd
-
     counts = made.frame.maps[MAP]
     y, x = np.nonzero(counts)
     rows = len(counts) - 1 - y if made.frame.tiles_from_below else y
@@ -116,7 +109,7 @@ def _map(made: Run) -> dict[str, Any]:
     return {"x": "x", "y": "y", "value": MAP, "size": (columns, rows)}
 
 
-def _draw_map(made: Run, path: "Path") -> None:
+def _draw_map(made: Run, path: Path) -> None:
     heat_map(
         made.frame.maps[MAP], path, title=f"Sample tests a tile: {WHAT}", unit="sample tests a tile", size=SIZE,
         tile=made.frame.tile, from_below=made.frame.tiles_from_below,
