@@ -115,16 +115,11 @@ def _notes(table: pd.DataFrame) -> list[str]:
 def _draw(table: pd.DataFrame, path: Path) -> None:
     table = table.assign(thousands=table["patches"] / 1000)
     lines(
-        table,
-        path,
-        x="thousands",
-        y="ms",
-        by="tile",
+        table, path, x="thousands", y="ms", by="tile",
         title=f"Frame time by tile size and zoom, GTX 280; published order: {PUBLISHED_ORDER}",
-        x_label="patches rasterized [thousands]",
-        y_label="time of a frame [ms]",
+        x_label="patches rasterized [thousands]", y_label="time of a frame [ms]",
         said=[_order_said(rows, int(zoom)) for zoom, rows in table.groupby("zoom")],
-    )
+    )  # fmt: skip
 
 
 def _order_said(rows: pd.DataFrame, zoom: int) -> tuple[float, float, str]:

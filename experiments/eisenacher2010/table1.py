@@ -122,13 +122,7 @@ def _growth(table: pd.DataFrame) -> str:
 def _draw(table: pd.DataFrame, path: Path) -> None:
     labelled = table.assign(stage="address calculation, model")
     lines(
-        labelled,
-        path,
-        x="tile",
-        y="ours",
-        by="stage",
-        published="published",
-        title="Address calculation by tile size (fitted at 4 and 32)",
-        x_label="tile [pixels a side]",
+        labelled, path, x="tile", y="ours", by="stage", published="published",
+        title="Address calculation by tile size (fitted at 4 and 32)", x_label="tile [pixels a side]",
         y_label="time [ms]",
-    )
+    )  # fmt: skip

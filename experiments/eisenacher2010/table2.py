@@ -83,12 +83,6 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
         }
     )
     paired_bars(
-        table,
-        path,
-        label="label",
-        ours="ours",
-        published="published",
-        status="status",
-        title="Total time of a frame, GTX 280",
-        unit="time [ms]",
-    )
+        table, path, label="label", ours="ours", published="published", status="status",
+        title="Total time of a frame, GTX 280", unit="time [ms]",
+    )  # fmt: skip

@@ -170,14 +170,9 @@ def _plot(best: pd.DataFrame, path: Path) -> None:
 
 def _map(best: pd.DataFrame, path: Path) -> None:
     choice_map(
-        best.assign(scene="teapot"),
-        path,
-        x="bound",
-        y="machine",
-        panel="scene",
-        title="The fastest way",
+        best.assign(scene="teapot"), path, x="bound", y="machine", panel="scene", title="The fastest way",
         legend="tiles",
-    )
+    )  # fmt: skip
 
 
 def _lists(lists: NDArray[np.int64], path: Path) -> None:

@@ -121,13 +121,6 @@ def _draw(table: pd.DataFrame, scene: str, path: Path) -> None:
     asked = {(row.key, row.column): row.value for row in rows.itertuples()}
     known = [asked[f"batches={row.batches}", f"{STAGES[row.stage]}_ms"] for row in table.itertuples()]
     lines(
-        table.assign(published=known),
-        path,
-        x="batches",
-        y="ms",
-        by="stage",
-        published="published",
-        title=f"Stages over batches, in place of {scene}, GTX 480",
-        x_label="batches",
-        y_label="time [ms]",
-    )
+        table.assign(published=known), path, x="batches", y="ms", by="stage", published="published",
+        title=f"Stages over batches, in place of {scene}, GTX 480", x_label="batches", y_label="time [ms]",
+    )  # fmt: skip

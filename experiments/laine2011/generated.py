@@ -172,12 +172,6 @@ def draw_times(title: str, cells: Sequence[Cell], path: Path) -> None:
     """Draw times of frames beside the published ones."""
     rows = [{"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status} for c in cells]
     paired_bars(
-        pd.DataFrame(rows),
-        path,
-        label="cell",
-        ours="ms",
-        published="published",
-        status="status",
-        title=f"{title}, generated scenes, GTX 480 (published: on the real ones)",
-        unit="time of a frame [ms]",
-    )
+        pd.DataFrame(rows), path, label="cell", ours="ms", published="published", status="status",
+        title=f"{title}, generated scenes, GTX 480 (published: on the real ones)", unit="time of a frame [ms]",
+    )  # fmt: skip

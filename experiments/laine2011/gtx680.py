@@ -63,12 +63,7 @@ def run(progress: Progress) -> Result:
 
 def _draw(table: pd.DataFrame, path: Path) -> None:
     lines(
-        table,
-        path,
-        x="area",
-        y="ratio",
-        by="stage",
+        table, path, x="area", y="ratio", by="stage",
         title="Time on a GTX 680 over time on a GTX 480, synthetic sweep (model)",
-        x_label="area of a triangle [pixels]",
-        y_label="time on GTX 680 : GTX 480",
-    )
+        x_label="area of a triangle [pixels]", y_label="time on GTX 680 : GTX 480",
+    )  # fmt: skip

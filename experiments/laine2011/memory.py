@@ -88,12 +88,5 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
     table = pd.DataFrame(rows)
     title = "Memory of the queues, generated scenes (model; published on the real ones)"
     paired_bars(
-        table,
-        path,
-        label="cell",
-        ours="ours",
-        published="published",
-        status="status",
-        title=title,
-        unit="memory [MB]",
-    )
+        table, path, label="cell", ours="ours", published="published", status="status", title=title, unit="memory [MB]",
+    )  # fmt: skip

@@ -172,12 +172,6 @@ def _draw(cells: Sequence[Cell], path: Path) -> None:
     table = pd.DataFrame(rows)
     title = "Counters of the profiler that are shares, Buddha, 1024x768"
     paired_bars(
-        table,
-        path,
-        label="counter",
-        ours="ours",
-        published="published",
-        status="status",
-        title=title,
+        table, path, label="counter", ours="ours", published="published", status="status", title=title,
         unit="share [%]",
-    )
+    )  # fmt: skip

@@ -5,7 +5,6 @@ method has broken where a byte is off by more than its own rounding. Cure: linke
 """
 
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,7 +73,10 @@ def run(progress: Progress) -> Result:
     ]
     table = pd.DataFrame(rows, columns=["method", "layers", "off"])
     found = [_boundary(table, method, order, first) for method in METHODS for order, first in orders.items()]
-    figures = [Figure("off", partial(_plot, table))]
+    figures = [Figure("off", partial(
+        lines, table, x="layers", y="off", by="method", title="Transparent layers: what bounded methods make of them",
+        x_label="layers over a pixel", y_label="worst byte [of 255]",
+    ))]  # fmt: skip
     title = "Transparent layers beyond fixed lists and k-buffers"
     return atlas_result("stability/bounded_layers", title, found, figures, [], {"layers": table})
 
@@ -92,10 +94,3 @@ def _boundary(table: pd.DataFrame, method: str, order: str, front_first: bool) -
         f"{lists.milliseconds:.4g} ms instead of {own.milliseconds:.4g} on {MACHINE} at {LAYERS[-1]} layers, and "
         f"{lists.frame.facts['list_bytes'] / SIZE**2:.0f} bytes a pixel",
     )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table, path, x="layers", y="off", by="method", title="Transparent layers: what bounded methods make of them",
-        x_label="layers over a pixel", y_label="worst byte [of 255]",
-    )  # fmt: skip

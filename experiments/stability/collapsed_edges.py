@@ -5,8 +5,7 @@ the patch. Where the edge is only nearly a point, its control points differ by a
 and so is the normal. Cure: weld such control points once a model, so that the edge is collapsed indeed.
 """
 
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -115,7 +114,11 @@ def run(progress: Progress) -> Result:
     ]
     failing = f"Lengths tried that fail: {band.min():.2g} to {band.max():.2g} radii"
     notes = [f"{failing}; no length at all is {error(0.0)} levels off, for its normal is borrowed.", _teapot()]
-    figures = [Figure("pole", lambda path: _plot(table, path))]
+    figures = [Figure("pole", partial(
+        lines, table, x="length", y="error", by="edge",
+        title="Shading at the pole of a dome, by the length of the edge there", x_label="length of the edge [radii]",
+        y_label="worst vertex [levels of 255 off]", log_x=True,
+    ))]  # fmt: skip
     title = "Collapsed patch edges"
     return atlas_result("stability/collapsed_edges", title, boundaries, figures, notes, {"lengths": table})
 
@@ -135,18 +138,4 @@ def _teapot() -> str:
     return (
         f"The teapot at 320x240: {int((area == 0).sum())} of {area.size} quads have no area, and {pointed} have two"
         " vertices in one place."
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="length",
-        y="error",
-        by="edge",
-        title="Shading at the pole of a dome, by the length of the edge there",
-        x_label="length of the edge [radii]",
-        y_label="worst vertex [levels of 255 off]",
-        log_x=True,
     )

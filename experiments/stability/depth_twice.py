@@ -170,17 +170,9 @@ def _notes(table: pd.DataFrame, slack: int) -> list[str]:
 def _plot(table: pd.DataFrame, path: Path) -> None:
     """Draw the share of holes by tilt, a line a depth."""
     drawn = (table.holes > 0) & ((table.second == next(iter(WAYS))) | (table.middle == MIDDLE))
+    line = table.second + table.middle.map(", middle at depth {:g}".format)
     lines(
-        table[drawn].assign(
-            line=table.second + table.middle.map(", middle at depth {:g}".format), holes=100 * table.holes
-        ),
-        path,
-        x="range",
-        y="holes",
-        by="line",
+        table[drawn].assign(line=line, holes=100 * table.holes), path, x="range", y="holes", by="line",
         title="Pixels of a tilted plane that stay empty: depth evaluated twice, in 24 bits",
-        x_label=f"depth across {SIZE} pixels [of the depth range]",
-        y_label="empty pixels [%]",
-        log_x=True,
-        log_y=True,
-    )
+        x_label=f"depth across {SIZE} pixels [of the depth range]", y_label="empty pixels [%]", log_x=True, log_y=True,
+    )  # fmt: skip

@@ -141,12 +141,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
-        table.assign(line=table.bound.map(lambda bound: f"bound {bound:g} pixels")),
-        path,
-        x="amplitude",
-        y="lost_pixels",
-        by="line",
-        title=f"Pixels that lose a quad, tiles of {TILE}, {WIDTH}x{HEIGHT}",
-        x_label="displacement [pixels]",
-        y_label="pixels",
-    )
+        table.assign(line=table.bound.map(lambda bound: f"bound {bound:g} pixels")), path, x="amplitude",
+        y="lost_pixels", by="line", title=f"Pixels that lose a quad, tiles of {TILE}, {WIDTH}x{HEIGHT}",
+        x_label="displacement [pixels]", y_label="pixels",
+    )  # fmt: skip

@@ -150,27 +150,16 @@ def _draw_queue(path: Path) -> None:
         for k, length in enumerate(frame(distance).subpatches.passes[:, 0])
     ]
     lines(
-        pd.DataFrame(rows),
-        path,
-        x="pass",
-        y="length",
-        by="distance",
-        title="Bound and split, by the eye's distance from the surface: without end",
-        x_label="pass",
+        pd.DataFrame(rows), path, x="pass", y="length", by="distance",
+        title="Bound and split, by the eye's distance from the surface: without end", x_label="pass",
         y_label="sub-patches in the queue",
-    )
+    )  # fmt: skip
 
 
 def _draw_depth(table: pd.DataFrame, path: Path) -> None:
     table.columns = ["depth", "distance"]
     lines(
-        table.assign(line="first distance at which sub-patches are dropped"),
-        path,
-        x="depth",
-        y="distance",
-        by="line",
-        title="How near the eye may come, by the halvings that a queue entry can hold",
-        x_label="halvings at most",
-        y_label="distance from the surface [patch sides]",
-        log_y=True,
-    )
+        table.assign(line="first distance at which sub-patches are dropped"), path, x="depth", y="distance", by="line",
+        title="How near the eye may come, by the halvings that a queue entry can hold", x_label="halvings at most",
+        y_label="distance from the surface [patch sides]", log_y=True,
+    )  # fmt: skip

@@ -6,8 +6,7 @@ bits, and a float32 matrix loses them again where the eye's place cancels agains
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,11 @@ def run(progress: Callable[[str], None]) -> Result:
         boundaries.append(Boundary(name, "distance", "radii", *found, WORDS, CURE))
     boundaries[0] = replace(boundaries[0], cost=_cost())
     table = pd.DataFrame(rows)
-    figure = Figure("far", lambda path: _plot(table, path))
+    figure = Figure("far", partial(
+        lines, table.assign(wrong=100 * table.wrong), x="distance", y="wrong", by="method",
+        title="Pixels that change when model and camera move away together",
+        x_label="distance from the origin [radii of the model]", y_label="pixels that change [%]", log_x=True,
+    ))  # fmt: skip
     at = table[(table.wrong > 0) & (table.distance > 0)].groupby("method", sort=False).distance.min()
     note = (
         "The first distance tried with a wrong pixel: " + ", ".join(f"{n} {d:,.0f} radii" for n, d in at.items()) + "."
@@ -157,19 +160,4 @@ def _cost(distance: float = DISTANCES[-1]) -> str:
     near = draw(sphere(0.0), "cudaraster", SIZE, own_matrix(distance)).milliseconds
     return (
         f"{near:.4f} ms on the {MACHINE}, as at the origin ({own:.4f} ms); uncured, {world:.4f} ms for a wrong picture"
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    """Draw what is wrong by distance."""
-    lines(
-        table.assign(wrong=100 * table.wrong),
-        path,
-        x="distance",
-        y="wrong",
-        by="method",
-        title="Pixels that change when model and camera move away together",
-        x_label="distance from the origin [radii of the model]",
-        y_label="pixels that change [%]",
-        log_x=True,
     )

@@ -153,12 +153,7 @@ def _notes() -> list[str]:
 def _plot(table: pd.DataFrame, path: Path) -> None:
     shown = table[table.turn == 0]
     lines(
-        shown.assign(percent=100 * shown.wrong),
-        path,
-        x="fold",
-        y="percent",
-        by="mask",
-        title="Wrong pixels of a folded patch seen face on",
-        x_label="fold [degrees]",
+        shown.assign(percent=100 * shown.wrong), path, x="fold", y="percent", by="mask",
+        title="Wrong pixels of a folded patch seen face on", x_label="fold [degrees]",
         y_label="covered pixels that are wrong [%]",
-    )
+    )  # fmt: skip

@@ -6,7 +6,7 @@ Compared is the depth of every covered sample with the exact one, in steps of 16
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,12 @@ def run(progress: Callable[[str], None]) -> Result:
         cost = _cost_of_finer() if name == COARSE else ""
         boundaries.append(Boundary(name, "slope of depth", "of the range a pixel", *found, wrong, cure, cost))
     table = pd.DataFrame(rows)
-    figure = Figure("grazing", lambda path: _plot(table, path))
+    figure = Figure("grazing", partial(
+        lines, table[table.error > 0].assign(error=table.error / WRONG), x="slope", y="error", by="method",
+        title="Depth of steep planes: largest error at a covered sample",
+        x_label="slope of depth [of the depth range a pixel]", y_label="error of depth [steps of 16 bits]", log_x=True,
+        log_y=True,
+    ))  # fmt: skip
     title = "Depth planes at grazing angles"
     return atlas_result("stability/grazing", title, boundaries, [figure], [_worst(table)], {"error": table})
 
@@ -158,20 +163,4 @@ def _worst(table: pd.DataFrame) -> str:
         "Largest error of depth at a covered sample: "
         + "; ".join(f"{n} {e:.2g} of the range" for n, e in worst.items())
         + "."
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    """Draw the error by slope."""
-    lines(
-        table[table.error > 0].assign(error=table.error / WRONG),
-        path,
-        x="slope",
-        y="error",
-        by="method",
-        title="Depth of steep planes: largest error at a covered sample",
-        x_label="slope of depth [of the depth range a pixel]",
-        y_label="error of depth [steps of 16 bits]",
-        log_x=True,
-        log_y=True,
     )

@@ -5,8 +5,7 @@ minimum. Where two fragments have the same 20 bits, one can win the upper half a
 for no order, so every run shows the same wrong colour.
 """
 
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -75,19 +74,8 @@ def run(progress: Progress) -> Result:
         for packing in ("32", "64")
     ]
     notes = [f"One step of the 20-bit depth is {2 * 2.0**-20:.3g} of NDC depth."]
-    figures = [Figure("mixed", lambda path: _plot(table, path))]
+    figures = [Figure("mixed", partial(
+        lines, table, x="gap", y="mixed", by="packing", title="Pixels with a colour that no triangle has",
+        x_label="distance of two sheets [NDC depth]", y_label="pixels [%]", log_x=True,
+    ))]  # fmt: skip
     return atlas_result("stability/half_words", "FreePipe's half words", boundaries, figures, notes, {"gaps": table})
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="gap",
-        y="mixed",
-        by="packing",
-        title="Pixels with a colour that no triangle has",
-        x_label="distance of two sheets [NDC depth]",
-        y_label="pixels [%]",
-        log_x=True,
-    )

@@ -87,14 +87,6 @@ def _notes() -> list[str]:
 
 def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
-        table,
-        path,
-        x="area",
-        y="ms",
-        by="pipeline",
-        title=f"One triangle on {MACHINE}, {SIDE}x{SIDE} pixels",
-        x_label="area of the triangle [pixels]",
-        y_label="time [ms]",
-        log_x=True,
-        log_y=True,
-    )
+        table, path, x="area", y="ms", by="pipeline", title=f"One triangle on {MACHINE}, {SIDE}x{SIDE} pixels",
+        x_label="area of the triangle [pixels]", y_label="time [ms]", log_x=True, log_y=True,
+    )  # fmt: skip

@@ -4,8 +4,7 @@ A pixel keeps four covered fragments in shared memory and sorts those; the origi
 first four found are kept: the list has the newest first. Cure: no limit, as many rounds as the longest list needs.
 """
 
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -84,7 +83,10 @@ def run(progress: Progress) -> Result:
             f"{4 * FRAGMENT_OUT_BYTES} bytes a quad",
         )
     )
-    figures = [Figure("wrong", lambda path: _plot(table, path))]
+    figures = [Figure("wrong", partial(
+        lines, table, x="layers", y="wrong", by="order", title=f"Pixels that lack a layer with {KEPT} fragments kept",
+        x_label="layers over a pixel", y_label="pixels [%]",
+    ))]  # fmt: skip
     return atlas_result(
         "stability/kept_fragments", "Four fragments a pixel", boundaries, figures, [], {"layers": table}
     )
@@ -102,17 +104,4 @@ def _boundary(table: pd.DataFrame, order: str) -> Boundary:
         "keep all fragments",
         f"{last.all_ms:.4g} ms instead of {last.four_ms:.4g} on {MACHINE} at {last.layers} layers, more"
         " shared memory not counted",
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="layers",
-        y="wrong",
-        by="order",
-        title=f"Pixels that lack a layer with {KEPT} fragments kept",
-        x_label="layers over a pixel",
-        y_label="pixels [%]",
     )

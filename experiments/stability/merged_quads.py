@@ -6,7 +6,7 @@ colour where its samples would mix both. Wrong is a pixel off by more than a six
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -47,7 +47,10 @@ def run(progress: Callable[[str], None]) -> Result:
             )
         )  # fmt: skip
     table = pd.DataFrame(rows)
-    figure = Figure("creases", lambda path: _plot(table, path))
+    figure = Figure("creases", partial(
+        lines, table, x="fold", y="off", by="samples", title="Merged quads at a crease",
+        x_label="fold [degrees between the normals]", y_label="most that a pixel is off [of 255]", log_x=True,
+    ))  # fmt: skip
     note = f"Folded by {FOLDS[-1]:g} degrees: {'; '.join(_most(table))}."
     return atlas_result(
         "stability/merged_quads", "Merged quads at a crease", boundaries, [figure], [note], {"off": table}
@@ -94,10 +97,3 @@ def _cost(spp: int) -> str:
         work = quad_shading(mesh(PIXEL_SIZED), samples, entries, load_machine("h200").simt).works[0]
         counts.append(work.total(QuadEvent.SHADED_QUADS))
     return f"{counts[0] / counts[1]:.1f} times the shading at triangles of {PIXEL_SIZED:g} pixels"
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table, path, x="fold", y="off", by="samples", title="Merged quads at a crease",
-        x_label="fold [degrees between the normals]", y_label="most that a pixel is off [of 255]", log_x=True,
-    )  # fmt: skip

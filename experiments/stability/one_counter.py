@@ -106,14 +106,7 @@ def _notes() -> list[str]:
 
 def _plot(table: pd.DataFrame, machine: str, path: Path) -> None:
     lines(
-        table[table.share > 0],
-        path,
-        x="share",
-        y="ms",
-        by="variant",
-        title=f"Address calculation of {PATCHES} patches, {machine}",
-        x_label="share of patches in one tile",
-        y_label="time [ms]",
-        log_x=True,
-        log_y=True,
-    )
+        table[table.share > 0], path, x="share", y="ms", by="variant",
+        title=f"Address calculation of {PATCHES} patches, {machine}", x_label="share of patches in one tile",
+        y_label="time [ms]", log_x=True, log_y=True,
+    )  # fmt: skip

@@ -125,13 +125,6 @@ def _boundary(table: pd.DataFrame, cure: str) -> Boundary:
 
 def _plot(table: pd.DataFrame, path: Path, column: str, label: str) -> None:
     lines(
-        table,
-        path,
-        x="weight",
-        y=column,
-        by="cure",
-        title="A flat square whose one edge weighs less",
-        x_label="weight of the edge (the others: 1)",
-        y_label=label,
-        log_x=True,
-    )
+        table, path, x="weight", y=column, by="cure", title="A flat square whose one edge weighs less",
+        x_label="weight of the edge (the others: 1)", y_label=label, log_x=True,
+    )  # fmt: skip

@@ -5,7 +5,7 @@ cannot process model have more than 10k". The limit is the machine's, not the me
 of the two grid synchronisations have none.
 """
 
-from pathlib import Path
+from functools import partial
 
 import pandas as pd
 
@@ -46,7 +46,10 @@ def run(progress: Progress) -> Result:
     table = pd.DataFrame(rows)
     boundaries = [_boundary(name) for name in MACHINES]
     notes = [f"Published: no more than {STATED} triangles on a GPU that is not named."]
-    figures = [Figure("machines", lambda path: _plot(table, path))]
+    figures = [Figure("machines", partial(
+        lines, table, x="registers", y="triangles", by="machine", title="Triangles that a one-pass compaction can take",
+        x_label=f"registers a thread (the source: {REGISTERS})", y_label="triangles",
+    ))]  # fmt: skip
     return atlas_result(
         "stability/resident_blocks", "Resident blocks of a one-pass compaction", boundaries, figures, notes,
         {"machines": table},
@@ -63,17 +66,4 @@ def _boundary(name: str) -> Boundary:
         "the launch is refused: nothing is drawn",
         "three launches in place of two grid synchronisations",
         f"{2 * machine.launch.stream_us:.3g} us for two more launches in a stream",
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="registers",
-        y="triangles",
-        by="machine",
-        title="Triangles that a one-pass compaction can take",
-        x_label=f"registers a thread (the source: {REGISTERS})",
-        y_label="triangles",
     )

@@ -5,8 +5,7 @@ buffers, so that nothing is lost but time. Three queues can overflow: sub-triang
 segments of bins and of tiles, where few triangles cover many of them.
 """
 
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,7 +94,12 @@ def run(progress: Progress) -> Result:
     table = pd.DataFrame(rows).assign(full=lambda t: t.needed / t.room)
     progress("stability/retries: boundaries")
     boundaries = [_boundary(queue) for queue in ("sub-triangles", "bin segments", "tile segments")]
-    figures = [Figure("queues", lambda path: _plot(table, path))]
+    figures = [Figure("queues", partial(
+        lines, table, x="triangles", y="full", by="queue",
+        title="Room that CudaRaster needs over the room of its first attempt",
+        x_label=f"triangles over the whole screen of {SIZE}x{SIZE} pixels", y_label="needed / room", log_x=True,
+        log_y=True,
+    ))]  # fmt: skip
     return atlas_result(
         "stability/retries", "CudaRaster's queues overflow and the draw is repeated", boundaries, figures, [],
         {"queues": table},
@@ -138,19 +142,4 @@ def frame(count: int) -> Run:
     scene = Scene("screen", mesh=Mesh(_screen(), triangles, clip_space=True))
     return simulate(
         scene, "cudaraster", MACHINE, width=SIZE, height=SIZE, camera=np.eye(4), picture=False, first_frame=True
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="triangles",
-        y="full",
-        by="queue",
-        title="Room that CudaRaster needs over the room of its first attempt",
-        x_label=f"triangles over the whole screen of {SIZE}x{SIZE} pixels",
-        y_label="needed / room",
-        log_x=True,
-        log_y=True,
     )

@@ -6,7 +6,7 @@ and less. Every sample inside must be hit once. A hole is a sample that no trian
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -37,7 +37,12 @@ def run(progress: Callable[[str], None]) -> Result:
         ]
         boundaries.append(_row(name, [any(pair) for pair in swept]))
     table = pd.DataFrame(rows)
-    figure = Figure("seams", lambda path: _plot(table, path))
+    figure = Figure("seams", partial(
+        # what lies on the samples is drawn one step to the left of the rest
+        lines, table.assign(offset=table.offset.where(table.offset > 0.0, OFFSETS[-2] / 4)), x="offset", y="doubles",
+        by="method", title="Samples of a closed mesh that are hit twice",
+        x_label="edges from samples [pixels; leftmost point: 0]", y_label="double hits", log_x=True,
+    ))  # fmt: skip
     title = "Shared edges on sample positions"
     return atlas_result("stability/shared_edges", title, boundaries, [figure], _notes(table), {"defects": table})
 
@@ -98,18 +103,3 @@ def _notes(table: pd.DataFrame) -> list[str]:
         f" {'; '.join(texts)}; holes {table.holes.sum()} over all methods and distances."
     )
     return [note]
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    """Draw double hits by distance; what lies on the samples is drawn one step to the left of the rest."""
-    lines(
-        table.assign(offset=table.offset.where(table.offset > 0.0, OFFSETS[-2] / 4)),
-        path,
-        x="offset",
-        y="doubles",
-        by="method",
-        title="Samples of a closed mesh that are hit twice",
-        x_label="edges from samples [pixels; leftmost point: 0]",
-        y_label="double hits",
-        log_x=True,
-    )

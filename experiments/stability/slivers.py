@@ -154,11 +154,6 @@ def _plot(table: pd.DataFrame, path: Path) -> None:
         for name, group in table.groupby("method", sort=False)
     }
     value_maps(
-        maps,
-        path,
-        title="Samples of slivers that come out wrong",
-        unit="wrong samples / exact samples",
-        x_label="length : width",
-        y_label="angle [degrees]",
-        log_x=True,
-    )
+        maps, path, title="Samples of slivers that come out wrong", unit="wrong samples / exact samples",
+        x_label="length : width", y_label="angle [degrees]", log_x=True,
+    )  # fmt: skip

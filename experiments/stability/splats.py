@@ -5,7 +5,7 @@ that end before the Gaussian does, order by the depths of centres, a near plane 
 bits, determinants that round to zero, and one thread for however many tiles.
 """
 
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -123,7 +123,10 @@ def run(progress: Progress) -> Result:
     rows = [{"tile": f"{tile}x{tile}", "opacity": o, "cut": cut(o, tile)} for tile in (4, 16) for o in OPACITIES]
     table = pd.DataFrame(rows)
     progress("stability/splats: boundaries")
-    figures = [Figure("cut", lambda path: _plot(table, path))]
+    figures = [Figure("cut", partial(
+        lines, table, x="opacity", y="cut", by="tile", title="What a square of three sigmas leaves out of one Gaussian",
+        x_label="opacity", y_label="largest difference of a channel",
+    ))]  # fmt: skip
     return atlas_result("stability/splats", "Splats by tile lists", boundaries(), figures, (), {"cut": table})
 
 
@@ -160,16 +163,3 @@ def boundaries() -> list[Boundary]:
             "bound=box", f"{waits(10.0, 'box'):.0%} of the frame at scale 10 all the same: its tiles remain",
         ),
     ]  # fmt: skip
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="opacity",
-        y="cut",
-        by="tile",
-        title="What a square of three sigmas leaves out of one Gaussian",
-        x_label="opacity",
-        y_label="largest difference of a channel",
-    )

@@ -4,8 +4,7 @@ Each tile's list has room for all triangles of a model of at most 100, else for 
 beyond is lost here (in the original it overwrites the next tile's list). Cure: count, scan, fill.
 """
 
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -104,18 +103,9 @@ def run(progress: Progress) -> Result:
             cost,
         ),
     ]
-    figures = [Figure("lost", lambda path: _plot(table, path))]
-    return atlas_result("stability/tile_lists", "Fixed tile lists", boundaries, figures, [], {"shares": table})
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table.melt("share", var_name="what", value_name="count"),
-        path,
-        x="share",
-        y="count",
-        by="what",
-        title=f"What Ru's fixed lists lose, {MODEL} triangles",
-        x_label="share of the triangles in one tile",
+    figures = [Figure("lost", partial(
+        lines, table.melt("share", var_name="what", value_name="count"), x="share", y="count", by="what",
+        title=f"What Ru's fixed lists lose, {MODEL} triangles", x_label="share of the triangles in one tile",
         y_label="entries, pixels",
-    )
+    ))]  # fmt: skip
+    return atlas_result("stability/tile_lists", "Fixed tile lists", boundaries, figures, [], {"shares": table})

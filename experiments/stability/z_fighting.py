@@ -5,7 +5,7 @@ pixel, whichever is drawn first.
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -46,7 +46,11 @@ def run(progress: Callable[[str], None]) -> Result:
     table = pd.DataFrame(rows)
     told = table[table.distance == TOLD]
     boundaries = [_row(row.format, row.holds, row.breaks) for row in told.itertuples()]
-    figure = Figure("separation", lambda path: _plot(table, path))
+    figure = Figure("separation", partial(
+        lines, table, x="distance", y="breaks", by="format",
+        title=f"Walls closer than this fight (near {NEAR:g}, far {FAR:g})", x_label="distance [world units]",
+        y_label="separation [world units]", log_x=True, log_y=True,
+    ))  # fmt: skip
     title = f"Z-fighting by depth format, near {NEAR:g}, far {FAR:g}"
     return atlas_result("stability/z_fighting", title, boundaries, [figure], _notes(table), {"separation": table})
 
@@ -118,19 +122,3 @@ def _notes(table: pd.DataFrame) -> list[str]:
 def _depth_bytes(run: Run) -> int:
     """Bytes of depth read and written."""
     return sum(int(stream.bytes) for work in run.frame.works for stream in work.streams if stream.buffer == "depth")
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    """Draw the separation that breaks, by distance."""
-    lines(
-        table,
-        path,
-        x="distance",
-        y="breaks",
-        by="format",
-        title=f"Walls closer than this fight (near {NEAR:g}, far {FAR:g})",
-        x_label="distance [world units]",
-        y_label="separation [world units]",
-        log_x=True,
-        log_y=True,
-    )

@@ -184,16 +184,9 @@ def _notes(table: pd.DataFrame) -> list[str]:
 def _plot(table: pd.DataFrame, path: Path, column: str, label: str, title: str) -> None:
     shown = table.assign(line=table.model + " level " + table.level.astype(str))
     lines(
-        shown,
-        path,
-        x="area",
-        y=column,
-        by="line",
-        title=title,
-        x_label="mean triangle area [pixels]",
-        y_label=label,
+        shown, path, x="area", y=column, by="line", title=title, x_label="mean triangle area [pixels]", y_label=label,
         log_x=True,
-    )
+    )  # fmt: skip
 
 
 def _pictures(model: Model) -> list[Figure]:

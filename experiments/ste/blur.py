@@ -159,16 +159,10 @@ def _crossing(table: pd.DataFrame, radius: float, name: str) -> str:
 
 def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
-        table.assign(line=table.algorithm + table.radius.map(", circles of {:g} px".format)),
-        path,
-        x="way",
-        y="cost",
-        by="line",
-        title=f"Cost of a unit square by motion, {SPP} samples a pixel",
-        x_label="motion while the shutter is open [pixels]",
-        y_label="instructions a polygon",
-        log_y=True,
-    )
+        table.assign(line=table.algorithm + table.radius.map(", circles of {:g} px".format)), path, x="way", y="cost",
+        by="line", title=f"Cost of a unit square by motion, {SPP} samples a pixel",
+        x_label="motion while the shutter is open [pixels]", y_label="instructions a polygon", log_y=True,
+    )  # fmt: skip
 
 
 def _maps(path: Path) -> None:

@@ -6,7 +6,7 @@ A hits; at random rotation the mean of w and of h is perimeter / pi (derived: pu
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -73,7 +73,11 @@ def run(progress: Callable[[str], None]) -> Result:
         "The 'published' column is the closed form of the stored facts, derived there, not a published measurement.",
     ]
     shown = table.query("polygon == 'square' and touch == 'box'").assign(stamp=lambda t: t.stamp.map("{0}x{0}".format))
-    figure = Figure("ste", lambda path: _plot(shown, path))
+    figure = Figure("ste", partial(
+        lines, shown, x="area", y="ste", by="stamp", published="closed_form",
+        title="STE of squares by stamp, all stamps of the box (diamonds: closed form)", x_label="area [pixels]",
+        y_label="STE [%]", log_x=True, log_y=True,
+    ))  # fmt: skip
     source = "Closed form of published/facts.md, section 1.2; definitions of Fatahalian et al. 2009"
     return Result(
         name="ste/closed_form",
@@ -85,22 +89,6 @@ def run(progress: Callable[[str], None]) -> Result:
         notes=notes,
         warnings=[],
         tables={"intervals": table},
-    )
-
-
-def _plot(table: pd.DataFrame, path: Path) -> None:
-    lines(
-        table,
-        path,
-        x="area",
-        y="ste",
-        by="stamp",
-        published="closed_form",
-        title="STE of squares by stamp, all stamps of the box (diamonds: closed form)",
-        x_label="area [pixels]",
-        y_label="STE [%]",
-        log_x=True,
-        log_y=True,
     )
 
 

@@ -5,7 +5,7 @@ Patches are diced evenly here, to edges of a third of the paper's bounds of 8x8 
 """
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -62,7 +62,11 @@ def run(progress: Callable[[str], None]) -> Result:
         "The quoted 2 % is a prediction in the literature, so no error against it is averaged.",
         "Hits count every covered sample, hidden ones too; every stamp that a micropolygon's box touches is tested.",
     ]
-    figure = Figure("area", lambda path: _plot(sweep, path))
+    figure = Figure("area", partial(
+        lines, sweep.assign(line="8x8 stamp, squares"), x="area", y="ste", by="line", published="closed_form",
+        title="STE of the 8x8 stamp by polygon area (diamonds: closed form)", x_label="area [pixels]",
+        y_label="STE [%]",
+    ))  # fmt: skip
     source = "Eisenacher & Loop 2010, introduction and section 6"
     tables = {"sweep": sweep, "scenes": pd.DataFrame(rows)}
     return Result(
@@ -115,17 +119,3 @@ def _scene(name: str, bound: float) -> dict[str, Any]:
         "ste": 100 * count.ste,
         "sample_tests": count.tests,
     }
-
-
-def _plot(sweep: pd.DataFrame, path: Path) -> None:
-    lines(
-        sweep.assign(line="8x8 stamp, squares"),
-        path,
-        x="area",
-        y="ste",
-        by="line",
-        published="closed_form",
-        title="STE of the 8x8 stamp by polygon area (diamonds: closed form)",
-        x_label="area [pixels]",
-        y_label="STE [%]",
-    )

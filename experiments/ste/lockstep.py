@@ -111,14 +111,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 def _plot(table: pd.DataFrame, path: Path) -> None:
     lines(
-        table.assign(line=table.algorithm + ", " + table.scene),
-        path,
-        x="lanes",
-        y="utilisation",
-        by="line",
-        published="published",
-        title="Lanes at work (diamonds: Luong 2010)",
-        x_label="lanes of a warp",
-        y_label="lanes at work [%]",
-        log_x=True,
-    )
+        table.assign(line=table.algorithm + ", " + table.scene), path, x="lanes", y="utilisation", by="line",
+        published="published", title="Lanes at work (diamonds: Luong 2010)", x_label="lanes of a warp",
+        y_label="lanes at work [%]", log_x=True,
+    )  # fmt: skip

@@ -1,7 +1,6 @@
 """Where software meets hardware: CudaRaster against the fixed-function pipe over the size of triangles."""
 
 from functools import partial
-from pathlib import Path
 
 import pandas as pd
 
@@ -38,7 +37,11 @@ def run(progress: Progress) -> Result:
         for machine, rows in ratios.groupby("machine", sort=False)
         for row in rows.itertuples()
     ]
-    figure = Figure("ratio", partial(_draw, ratios))
+    figure = Figure("ratio", partial(
+        lines, ratios, x="area", y="ratio", by="machine", log_x=True, log_y=True,
+        title="CudaRaster against fixed function: below 1 software is faster", x_label="area of a triangle [pixels]",
+        y_label="time of software / of hardware",
+    ))  # fmt: skip
     title = (
         f"Where software meets hardware: CudaRaster against fixed function, two sheets of triangles, {WIDTH}x{HEIGHT}"
     )
@@ -75,11 +78,3 @@ def _closest(ratios: pd.DataFrame) -> str:
         f"Software comes closest on {row['machine']} at {row['area']:g} px: fixed function at"
         f" {1 / row['ratio']:.2g} of its rates would be as fast."
     )
-
-
-def _draw(ratios: pd.DataFrame, path: Path) -> None:
-    lines(
-        ratios, path, x="area", y="ratio", by="machine", log_x=True, log_y=True,
-        title="CudaRaster against fixed function: below 1 software is faster",
-        x_label="area of a triangle [pixels]", y_label="time of software / of hardware",
-    )  # fmt: skip
