@@ -3,19 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.ru_pictures import CAMERA, HEIGHT, SIMT, WIDTH, draw, work
 from tests.textured_soup import soup
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.executor import Executor
-from tilestamp.simulator.pipelines import pipeline_options
-from tilestamp.simulator.pipelines.tiled import tiled
-from tilestamp.simulator.scenes.camera import LookAt
 from tilestamp.simulator.scenes.scene import Mesh, Scene
 from tilestamp.simulator.stages.ru2016.occlusion_blur import occlusion_blur
-
-WIDTH, HEIGHT = 61, 47  # no multiples of a tile
-SIMT = Simt(coalescing=2, atomic_merge=0, sms=2)
-CAMERA = LookAt((0, 0, 4), (0, 0, 0), fov_degrees=45)
 
 
 @pytest.fixture(scope="module")
@@ -26,15 +19,6 @@ def scene():
 @pytest.fixture(scope="module")
 def matrix():
     return CAMERA.matrix(WIDTH, HEIGHT)
-
-
-def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
-    name = "tiled" if pipeline is tiled else "per-primitive"
-    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, pipeline_options(name, options), Executor())
-
-
-def work(frame, kernel):
-    return next(w for w in frame.works if w.kernel == kernel)
 
 
 @pytest.fixture

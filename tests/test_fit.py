@@ -1,7 +1,6 @@
 """How fitted a cell is: a made-up experiment with fitted numbers of known effect."""
 
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -49,13 +48,20 @@ def experiment(_progress):
         cell("faster", "word", "", "alu", of=(("mostly alu", "time"), ("hardly", "time"))),
         cell("slower", "word", "", "alu", of=(("hardly", "time"),)),
     ]
-    return Result(name="made-up", title="", source="", cells=cells)
+    return result(*cells)
+
+
+def result(*cells):
+    return Result(name="made-up", title="", source="", cells=list(cells))
+
+
+def judged(run):
+    return run_judged(run, lambda _: None)[0].cells
 
 
 @pytest.fixture(scope="module")
 def cells():
-    found = run_judged(experiment, lambda _: None)[0].cells
-    return {(c.row, c.column): c for c in found}
+    return {(c.row, c.column): c for c in judged(experiment)}
 
 
 @pytest.mark.parametrize(
@@ -84,13 +90,12 @@ def test_the_numbers_are_named_with_the_part_of_each(cells):
 
 def test_a_cell_that_a_number_was_chosen_on_is_fitted_though_it_follows_little():
     target = Fitted("n", 1.0, (f"{HERE} | made-up | raster | time",))
-    here = Result(name="made-up", title="", source="", cells=[cell("raster", "time", "ms", 10.0)])
 
     def little(_progress):
         assert target.value > 0
-        return here
+        return result(cell("raster", "time", "ms", 10.0))
 
-    found = run_judged(little, lambda _: None)[0].cells[0]
+    (found,) = judged(little)
     assert (found.status, found.share) == ("fitted", 1.0)
 
 
@@ -113,30 +118,28 @@ def test_a_word_is_as_fitted_as_the_most_fitted_of_its_cells(cells):
 
 
 def test_a_number_that_is_that_of_a_fitted_cell_is_fitted(cells):
-    one, again = Result(name="x", title="", source="", cells=[]), []
-    gap = Fitted("gap", 1.0, (f"{HERE} | x | a | time",))
+    gap = Fitted("gap", 1.0, (f"{HERE} | made-up | a | time",))
 
     def run(_progress):
-        again[:] = [
+        return result(
             cell("a", "time", "ms", 9 + gap.value),
             cell("b", "time", "ms", 9 + gap.value, of=(("a", "time"),)),
             cell("c", "time", "ms", 8 + gap.value, of=(("a", "time"),)),
-        ]
-        return replace(one, cells=list(again))
+        )
 
-    found = run_judged(run, lambda _: None)[0].cells
-    assert [c.status for c in found] == ["fitted", "fitted", "partly fitted"]
+    assert [c.status for c in judged(run)] == ["fitted", "fitted", "partly fitted"]
     assert cells["again", "time"].status == "fitted"
 
 
-def test_numbers_of_other_frames_are_not_moved():
+@pytest.mark.parametrize("other", [{"frame": THERE}, {"status": "reported"}])
+def test_nothing_is_run_again_for_cells_of_other_frames_or_only_reported(other):
     runs = []
 
-    def elsewhere(_progress):
+    def run(_progress):
         runs.append(moved())
-        return Result(name="made-up", title="", source="", cells=[cell("a", "b", "ms", ALU.value, THERE)])
+        return result(cell("a", "b", "ms", ALU.value, **other))
 
-    run_judged(elsewhere, lambda _: None)
+    judged(run)
     assert runs == [""]
 
 
@@ -285,21 +288,10 @@ def test_a_fitted_event_of_a_mix_must_say_to_what(tmp_path, monkeypatch, line):
         load_mix("mine", "1.3")
 
 
-def test_nothing_is_run_again_for_cells_that_an_experiment_only_reports():
-    runs = []
-
-    def reports(_progress):
-        runs.append(moved())
-        return Result(name="x", title="", source="", cells=[cell("a", "b", "ms", ALU.value, status="reported")])
-
-    run_judged(reports, lambda _: None)
-    assert runs == [""]
-
-
 def test_a_word_is_as_fitted_as_the_times_that_it_is_made_of_though_they_are_only_reported():
     def run(_progress):
         made_of = cell("a", "time", "ms", 5 * ALU.value / 3 + 5, status="reported")
         word = cell("a", "word", "", "fast", of=(("a", "time"),))
-        return Result(name="x", title="", source="", cells=[made_of, word])
+        return result(made_of, word)
 
-    assert [c.status for c in run_judged(run, lambda _: None)[0].cells] == ["reported", "partly fitted"]
+    assert [c.status for c in judged(run)] == ["reported", "partly fitted"]

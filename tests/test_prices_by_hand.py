@@ -12,7 +12,6 @@ from tilestamp.models.demand import demand
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.fixed_function import pipe_time
 from tilestamp.models.launch import PipeLaunch
-from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import opened
 from tilestamp.models.schedule import play
@@ -280,7 +279,7 @@ def test_an_l1_that_holds_loads_asks_once_an_sm():
     assert (moved.l2_bytes, moved.dram_bytes) == (1750, 1000)
 
 
-# fixed function and launch graphs
+# fixed function
 
 
 def test_the_slowest_unit_of_a_pipe_by_hand():
@@ -293,32 +292,3 @@ def test_the_slowest_unit_of_a_pipe_by_hand():
     assert timing.term_cycles["pixels"] == 2000 / 10 * 2
     assert timing.term_cycles["dram"] == 100
     assert (timing.cycles, timing.milliseconds) == (2000 + 400, pytest.approx(0.0024))
-
-
-NODES = (
-    Node("a", 10.0),
-    Node("b", 4.0, ("a",), shares=True),
-    Node("c", 6.0, ("a",), shares=True),
-    Node("d", 1.0, ("b",)),
-)
-
-
-def test_a_stream_runs_nodes_one_after_another():
-    frame = on_stream(NODES, 2.0, 5.0)
-    assert (frame.gpu_us, frame.cpu_us, frame.path) == (29.0, 34.0, ("a", "b", "c", "d"))
-
-
-def test_what_fills_the_machine_holds_up_what_could_run_beside_it():
-    """A and the clear from 1; b, which waits for a alone, not before the clear's end at 21."""
-    nodes = (Node("a", 3.0), Node("clear", 20.0, fills=True), Node("b", 4.0, ("a",)), Node("c", 2.0, ("b", "clear")))
-    frame = as_graph(nodes, 1.0, 0.0)
-    assert frame.gpu_us == pytest.approx(21 + 4 + 1 + 2)
-    assert frame.path == ("clear", "b", "c")
-
-
-def test_branches_of_a_graph_share_bandwidth():
-    """A to 11; b and c from 12 at half speed: b to 20, c then has 2 left, to 22; d from 21 to 22."""
-    frame = as_graph(NODES, 1.0, 5.0)
-    assert frame.gpu_us == pytest.approx(22.0)
-    assert frame.cpu_us == pytest.approx(27.0)
-    assert frame.path in {("a", "c"), ("a", "b", "d")}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests import naive_textured as naive
+from tests.ru_pictures import CAMERA, HEIGHT, SIMT, WIDTH, draw, work
 from tests.textured_soup import soup
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
-from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.mix import load_mix
 from tilestamp.simulator.pipelines import pipeline_options
@@ -25,9 +25,6 @@ from tilestamp.simulator.stages.ru2016.tile_lists_fill import overlaps
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
 from tilestamp.simulator.stages.ru2016.vertex_shading import vertex_shading
 
-WIDTH, HEIGHT = 61, 47  # no multiples of a tile
-SIMT = Simt(coalescing=2, atomic_merge=0, sms=2)
-CAMERA = LookAt((0, 0, 4), (0, 0, 0), fov_degrees=45)
 NEAR_EDGE = 1e-4  # barycentric: float32 may decide otherwise here
 
 
@@ -39,15 +36,6 @@ def scene():
 @pytest.fixture(scope="module")
 def matrix():
     return CAMERA.matrix(WIDTH, HEIGHT)
-
-
-def draw(scene, matrix, pipeline=tiled, simt=SIMT, **options):
-    name = "tiled" if pipeline is tiled else "per-primitive"
-    return pipeline(scene, matrix, WIDTH, HEIGHT, simt, pipeline_options(name, options), Executor())
-
-
-def work(frame, kernel):
-    return next(w for w in frame.works if w.kernel == kernel)
 
 
 @pytest.mark.parametrize("culling", [True, False])

@@ -9,7 +9,6 @@ from tests import naive_textured as naive
 from tests.textured_soup import soup
 from tilestamp import simulate
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.launch_graph import Node, as_graph, on_stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.simt import Simt
@@ -220,33 +219,6 @@ def test_every_kernel_has_a_price(scene, matrix, optimized):
     mix = load_mix("binned", "8.6")
     for w in draw(scene, matrix, optimized=optimized).works:
         assert mix.launch(w, 32).events.sum() > 0
-
-
-def test_a_graph_takes_its_longest_path():
-    nodes = [Node("a", 5), Node("b", 1), Node("c", 2, ("a", "b"))]
-    assert as_graph(nodes, 1.0, 0.0).path == ("a", "c")
-    assert as_graph(nodes, 1.0, 0.0).gpu_us == 9.0
-    assert on_stream(nodes, 1.0, 2.0).gpu_us == 11.0
-    assert on_stream(nodes, 1.0, 2.0).cpu_us == 13.0
-
-
-@pytest.mark.parametrize("after", ["a", "b"])
-def test_a_node_that_waits_for_itself_or_a_later_one_is_refused(after):
-    with pytest.raises(KeyError):
-        as_graph([Node("a", 5, (after,)), Node("b", 1)], 1.0, 0.0)
-
-
-def test_nodes_bound_by_memory_share_it():
-    alone = as_graph([Node("a", 10, shares=True)], 0.0, 0.0)
-    both = as_graph([Node("a", 10, shares=True), Node("b", 4, shares=True), Node("c", 10)], 0.0, 0.0)
-    assert alone.gpu_us == 10.0
-    assert both.gpu_us == pytest.approx(14.0)  # b ends at 8, a does 6 more by itself
-    assert both.path == ("a",)
-
-
-def test_a_node_before_what_it_waits_for_is_refused():
-    with pytest.raises(KeyError):
-        as_graph([Node("a", 1, ("b",)), Node("b", 1)], 0.0, 0.0)
 
 
 def test_blocks_without_a_primitive_run_the_ballots_too(scene, matrix):

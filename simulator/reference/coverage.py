@@ -155,17 +155,9 @@ def _draw(
 
 @kernel
 def _draw_part(
-    part: int,
-    parts: int,
-    corners: Any,
-    depths: Any,
-    cull: Any,
-    grid: Grid,
-    first_row: int,
-    ids: Any,
-    depth: Any,
+    part: int, parts: int, corners: Any, depths: Any, cull: Any, grid: Grid, first_row: int, ids: Any, depth: Any,
     hits: Any,
-) -> None:
+) -> None:  # fmt: skip
     first, end = ids.shape[0] * part // parts, ids.shape[0] * (part + 1) // parts
     seen = (ids[first:end], depth[first:end], hits[first:end])
     _draw(corners, depths, cull, grid, first_row + first, first_row + end, *seen)

@@ -31,4 +31,5 @@ def _renew(folder: str, name: str, header: tuple[str, ...], entries: book.Entrie
     sys.stdout.flush()
 
 
-main()
+if __name__ == "__main__":
+    main()
