@@ -1,5 +1,6 @@
 """Small multiples of cost against error, and a picture beside the true one."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,27 +16,17 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 COLUMNS = 3  # panels side by side: more, and their texts cannot be read on a page
-LINES: tuple[dict[str, Any], ...] = (
-    {"color": "black", "linewidth": 0.9},
-    {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
-)
+LINES: dict[str, dict[str, Any]] = {
+    "front": {"color": "black", "linewidth": 0.9},
+    "front of software": {"color": "#888888", "linewidth": 0.9, "linestyle": "--"},
+}
 AMPLIFIED = 4.0  # differences are shown so many times as large
 
 
 def panels(
-    table: "pd.DataFrame",
-    path: Path,
-    *,
-    panel: str,
-    group: str,
-    x: str,
-    y: str,
-    front: str,
-    second: str,
-    x_label: str,
-    y_label: str,
-    title: str,
-) -> None:
+    table: "pd.DataFrame", path: Path, *, panel: str, group: str, x: str, y: str, fronts: Sequence[str], x_label: str,
+    y_label: str, title: str,
+) -> None:  # fmt: skip
     """Draw a panel for each value of ``panel``, a colour and mark for each of ``group``, the front as steps.
 
     Parameters
@@ -44,8 +35,10 @@ def panels(
         A row a point; an error of zero is drawn at the foot of a logarithmic panel.
     path : Path
         PNG to write.
-    panel, group, x, y, front, second : str
-        Columns; ``front`` and ``second``, of software alone, are bool.
+    panel, group, x, y : str
+        Columns.
+    fronts : sequence of str
+        Columns of bool: the front and, where it is another, that of software alone.
     """
     names = list(dict.fromkeys(table[panel]))
     groups = list(dict.fromkeys(table[group]))
@@ -55,26 +48,20 @@ def panels(
     size = (3.0 * columns, 2.5 * rows + 0.4)
     with figure(path, title, nrows=rows, ncols=columns, figsize=size, squeeze=False) as grid:
         for axes, name in zip(grid.flat, names, strict=False):
-            _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, (front, second))
+            _panel(axes, table[table[panel] == name], str(name), groups, group, x, y, fronts)
         for axes in grid.flat[len(names) :]:
             axes.set_axis_off()
         for axes in grid[:, 0]:
             axes.set_ylabel(y_label, fontsize=9)
         for axes in grid.flat[max(len(names) - columns, 0) : len(names)]:
             axes.set_xlabel(x_label, fontsize=9)
-        handles = [*(_mark(k) for k in range(len(groups))), *map(_line, LINES)]
-        grid.flat[len(names)].legend(handles, [*groups, "front", "front of software"], fontsize=9, loc="upper left")
+        lines = list(LINES)[: len(fronts)]
+        handles = [*(_mark(_style(k)) for k in range(len(groups))), *(_mark(LINES[line]) for line in lines)]
+        grid.flat[len(names)].legend(handles, [*groups, *lines], fontsize=9, loc="upper left")
 
 
 def _panel(
-    axes: "Axes",
-    rows: "pd.DataFrame",
-    name: str,
-    groups: list[str],
-    group: str,
-    x: str,
-    y: str,
-    fronts: tuple[str, str],
+    axes: "Axes", rows: "pd.DataFrame", name: str, groups: list[str], group: str, x: str, y: str, fronts: Sequence[str]
 ) -> None:
     linear = rows[y].max() < 10.0 * max(rows[y].min(), 1e-9)  # less than a decade: from zero
     positive = rows[y][rows[y] > 0]
@@ -83,7 +70,7 @@ def _panel(
     for index, key in enumerate(groups):
         mine = rows[group] == key
         axes.plot(rows[x][mine], heights[mine], **_style(index))
-    for front, line in zip(fronts, LINES, strict=True):
+    for front, line in zip(fronts, LINES.values(), strict=False):
         best = rows.assign(height=heights)[rows[front]].sort_values([x, "height"])
         axes.step(best[x], best["height"], where="post", **line)
     axes.set_xscale("log")
@@ -112,13 +99,7 @@ def _style(index: int) -> dict[str, Any]:
     return {"marker": marker, "linestyle": "none", "markersize": 5, "color": color, "alpha": 0.85}
 
 
-def _mark(index: int) -> "Line2D":
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], **_style(index))
-
-
-def _line(style: dict[str, Any]) -> "Line2D":
+def _mark(style: dict[str, Any]) -> "Line2D":
     from matplotlib.lines import Line2D
 
     return Line2D([], [], **style)

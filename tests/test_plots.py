@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tilestamp.reports.bars import paired_bars, stacked_bars
+from tilestamp.reports.methods_plot import panels
 from tilestamp.reports.plots import lines
 from tilestamp.reports.save import description
 
@@ -119,3 +120,11 @@ def test_a_path_with_a_suffix_gives_that_file_alone(tmp_path):
 def test_names_along_an_axis_are_said(tmp_path):
     stacked_bars(pd.DataFrame({"one": [1.0, 2.0]}, index=["bin", "fine"]), tmp_path / "plot", title="T", unit="ms")
     assert "Up: bin, fine; across: ms, 0 to 2.12." in description(tmp_path / "plot.png")
+
+
+@pytest.mark.parametrize("fronts", [["front"], ["front", "soft"]])
+def test_a_front_of_software_is_named_where_there_is_one(tmp_path, fronts):
+    points = pd.DataFrame({"scene": "a", "method": "b", "ms": [1.0, 2.0], "error": [3.0, 1.0], "front": True})
+    places = {"panel": "scene", "group": "method", "x": "ms", "y": "error"}
+    panels(points.assign(soft=[False, True]), tmp_path / "front.svg", **places, fronts=fronts, **LABELS)
+    assert ("<!-- front of software -->" in (tmp_path / "front.svg").read_text()) == (len(fronts) == 2)

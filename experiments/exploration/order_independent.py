@@ -235,8 +235,7 @@ SURE = (
 
 def _draw_front(table: pd.DataFrame, path: Path) -> None:
     panels(
-        table.assign(second=False), path, panel="machine", group="kind", x="ms", y="rms", front="front",
-        second="second",
+        table, path, panel="machine", group="kind", x="ms", y="rms", fronts=["front"],
         x_label="modelled time [ms]", y_label="error [steps of a byte]", title=f"Error against time, {MIDDLE} layers",
     )  # fmt: skip
 

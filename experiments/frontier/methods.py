@@ -244,22 +244,11 @@ def _front(table: pd.DataFrame, machine: str, error: str) -> Figure:
     """Time against one measure of error, a panel a scene."""
     rows = table[(table.machine == machine) & table.ms.notna() & table[error].notna()]
     rows = rows[rows.groupby("scene")[error].transform("max") > 0]  # a scene without an error has no front to show
-    rows = rows.assign(front=rows[f"front_{error}"], second=rows[f"software_front_{error}"])
     words, title = MEASURES[error]
-    columns: dict[str, Any] = {
-        "panel": "scene",
-        "group": "pipeline",
-        "x": "ms",
-        "y": error,
-        "front": "front",
-        "second": "second",
-    }
-    labels: dict[str, Any] = {
-        "x_label": "modelled time [ms]",
-        "y_label": words,
-        "title": f"{title} against modelled time, {machine}",
-    }
-    draw = partial(panels, rows, **columns, **labels)
+    draw = partial(
+        panels, rows, panel="scene", group="pipeline", x="ms", y=error, x_label="modelled time [ms]", y_label=words,
+        fronts=[f"front_{error}", f"software_front_{error}"], title=f"{title} against modelled time, {machine}",
+    )  # fmt: skip
     return Figure(f"{machine}-{error}", draw)
 
 

@@ -227,6 +227,6 @@ def _missing(scenes: dict[str, Scene]) -> list[str]:
 def _draw(table: pd.DataFrame, title: str, path: Path) -> None:
     kind = [rule.partition(", ")[2] or rule for rule in table["rule"]]
     panels(
-        table.assign(second=False, kind=kind), path, panel="level", group="kind", x="ms", y="rms", front="front",
-        second="second", x_label="modelled frame [ms]", y_label="error [steps of a byte, RMS]", title=title,
+        table.assign(kind=kind), path, panel="level", group="kind", x="ms", y="rms", fronts=["front"],
+        x_label="modelled frame [ms]", y_label="error [steps of a byte, RMS]", title=title,
     )  # fmt: skip
