@@ -18,9 +18,13 @@ from tilestamp.experiments.studies.store import Store
 from tilestamp.experiments.studies.study import Study
 from tilestamp.experiments.studies.study_file import StudyFile
 
-StorePath = Annotated[Path | None, Parameter(name="--store")]
-Picture = Annotated[Path | None, Parameter(name=["--output", "-o"])]
-Jobs = Annotated[int | None, Parameter(name=["--jobs", "-j"])]
+KEPT_IN = "SQLite file that keeps the cells; beside the study, with the same name, if not given."
+StudyPath = Annotated[Path, Parameter(help="The study, TOML (docs/studies.md).")]
+StorePath = Annotated[Path | None, Parameter(name="--store", help=KEPT_IN)]
+Picture = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write a picture of the answer as .png.")]
+Jobs = Annotated[
+    int | None, Parameter(name=["--jobs", "-j"], help="Processes; as many as the forecast is worth if not given.")
+]
 ask = App(
     name="ask",
     help="Ask a study: what is best where, what lies on a front, what matters, what is better still.",
@@ -30,7 +34,7 @@ ask = App(
 
 @ask.command
 def best(
-    file: Path,
+    file: StudyPath,
     axis: str,
     /,
     *,
@@ -44,20 +48,12 @@ def best(
 
     Parameters
     ----------
-    file
-        The study, TOML (docs/studies.md).
     axis
         The axis whose best value is wanted, such as `tile`.
     over
         The plane: two other axes, `zoom,machine`. Each place on all further axes is a panel.
     number
         What is to be small.
-    output
-        Write the map as .png.
-    store
-        SQLite file that keeps the cells; beside the study, with the same name, if not given.
-    jobs
-        Processes; as many as the forecast is worth if not given.
     """
     check_png(output)
     with _study(file, store) as (asked, say):
@@ -67,22 +63,16 @@ def best(
 
 @ask.command
 def front(
-    file: Path, one: str, other: str, /, *, output: Picture = None, store: StorePath = None, jobs: Jobs = None
+    file: StudyPath, one: str, other: str, /, *, output: Picture = None, store: StorePath = None, jobs: Jobs = None
 ) -> None:
     """Which cells nothing beats in two numbers at once: the Pareto front, both to be small.
 
     Parameters
     ----------
-    file
-        The study, TOML (docs/studies.md).
-    one, other
-        Numbers of a cell, such as `milliseconds` and `area`, or axes.
-    output
-        Write the front as .png.
-    store
-        SQLite file that keeps the cells; beside the study, with the same name, if not given.
-    jobs
-        Processes; as many as the forecast is worth if not given.
+    one
+        A number of a cell, such as `milliseconds`, or an axis.
+    other
+        Another one, such as `area`.
     """
     check_png(output)
     with _study(file, store) as (asked, say):
@@ -92,22 +82,16 @@ def front(
 
 @ask.command
 def screen(
-    file: Path, number: str = "milliseconds", /, *, walks: int = 8, output: Picture = None, store: StorePath = None
+    file: StudyPath, number: str = "milliseconds", /, *, walks: int = 8, output: Picture = None, store: StorePath = None
 ) -> None:
     """Which axes matter: Morris screening of the space between the ends of the study's axes.
 
     Parameters
     ----------
-    file
-        The study, TOML (docs/studies.md).
     number
         What is looked at.
     walks
         Through the space; each has a cell more than there are axes.
-    output
-        Write the effects as .png.
-    store
-        SQLite file that keeps the cells; beside the study, with the same name, if not given.
     """
     check_png(output)
     with _study(file, store) as (asked, _):
@@ -116,22 +100,22 @@ def screen(
 
 @ask.command
 def sobol(
-    file: Path, number: str = "milliseconds", /, *, points: int = 64, output: Picture = None, store: StorePath = None
+    file: StudyPath,
+    number: str = "milliseconds",
+    /,
+    *,
+    points: int = 64,
+    output: Picture = None,
+    store: StorePath = None,
 ) -> None:
     """What share of a number's variance each axis accounts for: Sobol indices.
 
     Parameters
     ----------
-    file
-        The study, TOML (docs/studies.md).
     number
         What is looked at.
     points
         A power of two; as many cells as points times (axes and two).
-    output
-        Write the indices as .png.
-    store
-        SQLite file that keeps the cells; beside the study, with the same name, if not given.
     """
     check_png(output)
     with _study(file, store) as (asked, _):
@@ -140,25 +124,19 @@ def sobol(
 
 @ask.command
 def search(
-    file: Path, wanted: str = "milliseconds", /, *, cells: int = 64, seed: int = 0, output: Picture = None,
+    file: StudyPath, wanted: str = "milliseconds", /, *, cells: int = 64, seed: int = 0, output: Picture = None,
     store: StorePath = None,
 ) -> None:  # fmt: skip
     """Look for the best point between the ends of the study's axes, or for the front of several numbers (optuna).
 
     Parameters
     ----------
-    file
-        The study, TOML (docs/studies.md).
     wanted
         What is to be small: `milliseconds`, or several numbers, `milliseconds,area`.
     cells
         To run, those that are stored included.
     seed
         Of the search: the same one asks for the same points.
-    output
-        Write how it went as .png.
-    store
-        SQLite file that keeps the cells; beside the study, with the same name, if not given.
     """
     check_png(output)
     with _study(file, store) as (asked, say):
