@@ -1,14 +1,31 @@
 """From cudaraster's buffers to a frame: colours, the sample shown, heat maps by tile."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.laine2011.coarse_raster import TileQueues
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers
 from tilestamp.simulator.stages.laine2011.pixel_barycentrics import pixel_barycentrics
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.work import Work
+
+_PART_ROWS = 32  # that one call of the worker takes, at least
+
+
+@kernel(lent=True)
+def _unpack_part(part: int, parts: int, color: Any, image: Any) -> None:
+    """Red, green and blue of a share of the rows; ``color`` has row 0 at the bottom."""
+    height, width = image.shape[:2]
+    for row in range(height * part // parts, height * (part + 1) // parts):
+        packed, channels = color[height - 1 - row], image[row].reshape(3 * width)
+        for x in range(width):
+            word = packed[x]
+            channels[3 * x], channels[3 * x + 1], channels[3 * x + 2] = word & 255, word >> 8 & 255, word >> 16 & 255
 
 
 def frame_image(
@@ -30,10 +47,12 @@ def frame_image(
         picture: NDArray[np.uint8] = np.clip(shaded * 255 + 0.5, 0, 255).astype(np.uint8)
         return picture[::-1]
     samples = len(buffers.color)
+    if samples == 1:
+        image = np.empty((height, width, 3), np.uint8)
+        for_parts(_unpack_part, parts_of(height, _PART_ROWS), buffers.color[0], image)
+        return image
     packed = np.ascontiguousarray(buffers.color[:, :height, :width][:, ::-1])
     bytes_ = packed.view(np.uint8).reshape(samples, height, width, 4)[..., :3]
-    if samples == 1:
-        return np.ascontiguousarray(bytes_[0])
     total = bytes_.sum(axis=0, dtype=np.uint16)
     mean: NDArray[np.uint8] = ((2 * total + samples) // (2 * samples)).astype(np.uint8)  # rounded to nearest
     return mean
