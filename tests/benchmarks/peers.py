@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 from tests.benchmarks.test_bench_cudaraster import sphere, waves
+from tilestamp.models.errors import MissingInputError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import Simt
@@ -53,7 +54,10 @@ def main() -> None:
     if chosen.growth:
         plot(pd.DataFrame(rows), chosen.growth)
     elif not chosen.millions:
-        timed("killeroo", KILLEROO, killeroo(), chosen.rounds)
+        try:
+            timed("killeroo", KILLEROO, killeroo(), chosen.rounds)
+        except MissingInputError as error:
+            sys.stdout.write(f"{error}\n")
 
 
 def timed(scene: str, triangles: int, draws: dict[str, Draw], rounds: int) -> list[dict[str, Any]]:
