@@ -15,8 +15,11 @@ NOTHING = "nothing is visible: all of it is off screen, nearer or farther than t
 
 
 def remarks(sentences: Mapping[str, str], facts: Mapping[str, Any]) -> tuple[str, ...]:
-    """Say what was lost, repeated or left to chance: a sentence for each of some facts that counts any."""
-    return tuple(sentence.format(facts[fact]) for fact, sentence in sentences.items() if facts.get(fact))
+    """Say what was lost, repeated or left to chance: a sentence for each of some facts that counts any.
+
+    A sentence has the fact's own number at ``{}``, and others by name.
+    """
+    return tuple(sentence.format(facts[fact], **facts) for fact, sentence in sentences.items() if facts.get(fact))
 
 
 @dataclass(frozen=True, eq=False)

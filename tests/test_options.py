@@ -102,7 +102,7 @@ def test_a_texture_is_an_array_or_its_nested_lists():
 
 def test_an_unknown_option_names_the_nearest_and_all():
     with pytest.raises(
-        TilestampError, match=r"has no option tyle \(did you mean 'tile'\?\); it has tile, cull_backfaces"
+        TilestampError, match=r"has no option tyle \(did you mean 'tile'\?\); it has cull_backfaces, perspective"
     ):
         options("tiled", tyle=8)
 

@@ -44,13 +44,7 @@ def across_polygons(
     options: AcrossPolygonsOptions,
     execute: Executor,
 ) -> Frame:
-    """Micropolygons in parallel: a lane each, warps as long as their longest (Fatahalian et al. 2009).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Micropolygons in parallel: a lane each, warps as long as their longest (Fatahalian et al. 2009)."""
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))
     polygons = micropolygons(scene, matrix, width, height, options.edge, options.triangles)
     execute(walk_boxes, polygons, samples, options.packing, simt)

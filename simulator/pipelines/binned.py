@@ -99,10 +99,7 @@ def binned(
 ) -> Frame:
     """Textured triangles through bins, tiles, quads and fragment lists, after a frame's clears (Zhang 2025).
 
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``; at most 2048 pixels on a side.
+    At most 2048 pixels on a side.
     """
     optimized = options.optimized
     mesh = geometry(scene)

@@ -46,13 +46,7 @@ class BitMaskOptions(MicropolygonInput, frozen=True, kw_only=True):
 def bit_mask(
     scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: BitMaskOptions, execute: Executor
 ) -> Frame:
-    """Micropolygons under a bit mask a patch: samples already hit are filtered (Yao et al.).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Micropolygons under a bit mask a patch: samples already hit are filtered (Yao et al.)."""
     offsets = sample_positions(options.spp, options.positions)
     samples, exact = new_samples(width, height, offsets), new_samples(width, height, offsets)
     made = micropolygons(scene, matrix, width, height, options.edge, options.triangles)

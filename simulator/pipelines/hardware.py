@@ -56,13 +56,7 @@ def hardware(
     options: HardwareOptions,
     execute: Executor,
 ) -> Frame:
-    """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate.
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """The fixed-function rasterizer of a GPU: a pipe of units, each with a rate."""
     mesh = triangle_mesh(scene)
     positions = clip_positions(mesh, matrix)
     frame, _, facts = execute(

@@ -50,13 +50,7 @@ def interleaved(
     options: InterleavedOptions,
     execute: Executor,
 ) -> Frame:
-    """Motion blur and defocus by interleaved sampling: a set-up for each time and lens point (Fatahalian et al. 2009).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Motion blur and defocus by interleaved sampling: a set-up for each time and lens point (Fatahalian 2009)."""
     pattern = interleaved_pattern(options.spp, options.tile)
     samples = blur_samples(width, height, pattern)
     still, moving = moving_micropolygons(scene, matrix, width, height, options)

@@ -50,13 +50,7 @@ class IntervalOptions(MotionInput, frozen=True, kw_only=True):
 def interval(
     scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: IntervalOptions, execute: Executor
 ) -> Frame:
-    """Motion blur and defocus by boxes over intervals of time and lens (Pixar's way; Fatahalian et al. 2009).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Motion blur and defocus by boxes over intervals of time and lens (Pixar's way; Fatahalian et al. 2009)."""
     pattern = stratified_pattern(options.spp)
     samples = blur_samples(width, height, pattern)
     still, moving = moving_micropolygons(scene, matrix, width, height, options)

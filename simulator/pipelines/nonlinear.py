@@ -78,13 +78,7 @@ def nonlinear(
     options: NonlinearOptions,
     execute: Executor,
 ) -> Frame:
-    """Fisheye, paraboloid and cylindrical pictures in tiles: a line of sight a sample, or tessellation.
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Fisheye, paraboloid and cylindrical pictures in tiles: a line of sight a sample, or tessellation."""
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))
     clip, made = scene_triangles(scene, matrix, width, height, options.edge)
     corners = eye_space(clip, matrix)

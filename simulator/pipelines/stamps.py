@@ -55,13 +55,7 @@ class StampsOptions(MicropolygonInput, frozen=True, kw_only=True):
 def stamps(
     scene: Scene, matrix: NDArray[Any], width: int, height: int, simt: Simt, options: StampsOptions, execute: Executor
 ) -> Frame:
-    """Micropolygons by stamps: n x n pixels tested at once, one level or two (after Fatahalian et al. 2009).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Micropolygons by stamps: n x n pixels tested at once, one level or two (after Fatahalian et al. 2009)."""
     shape = stamp_shape(options.stamp, options.touch, options.coarse)
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))
     polygons = micropolygons(scene, matrix, width, height, options.edge, options.triangles)

@@ -72,13 +72,7 @@ def stochastic(
     options: StochasticOptions,
     execute: Executor,
 ) -> Frame:
-    """Motion blur and defocus in tiles: bounds over time and lens, a 5D edge test a sample (after Laine et al. 2011).
-
-    Parameters
-    ----------
-    scene, matrix, width, height, simt, options, execute
-        See ``tilestamp.simulator.pipelines``.
-    """
+    """Motion blur and defocus in tiles: bounds over time and lens, a 5D edge test a sample (after Laine 2011)."""
     pattern, tile = stratified_pattern(options.spp, seed=options.sample_seed), options.tile
     samples = blur_samples(width, height, pattern)
     triangles, still = _triangles(scene, matrix, width, height, options)
