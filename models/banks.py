@@ -62,23 +62,6 @@ def bank_passes(words: Any, lanes: int, simt: Simt, access_words: int = 1) -> in
 
 
 @kernel
-def atomic_passes(words: Any, lanes: int, simt: Simt) -> int:
-    """Count the passes of one shared atomic: as ``bank_passes``, but every lane of a bank takes a pass of its own."""
-    mode = simt.bank_mode_bytes // WORD_BYTES
-    passes = 0
-    for first in range(0, lanes, simt.bank_lanes):
-        end = min(first + simt.bank_lanes, lanes)
-        most = 0
-        for i in range(first, end):
-            depth = 0
-            for j in range(first, end):
-                depth += words[i] >= 0 and words[j] >= 0 and (words[i] // mode - words[j] // mode) % simt.banks == 0
-            most = max(most, depth)
-        passes += most
-    return passes
-
-
-@kernel
 def _steps(words: Any, first: int, end: int, offset: int, banks: int) -> int:
     """Steps that serve the lanes first..end-1 on 1.x: one word is broadcast, other banks serve a lane each."""
     steps = 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import naive_banks
-from tilestamp.models.banks import atomic_passes, bank_passes
+from tilestamp.models.banks import bank_passes
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.simt import Simt
 
@@ -102,24 +102,6 @@ def test_lanes_at_one_word_share_it():
 
 def test_idle_lanes_take_no_pass():
     assert [bank_passes(np.full(32, -1, np.int64), 32, simt) for simt in ORACLES] == [0, 0, 0, 0]
-
-
-def test_atomics_at_one_word_take_a_pass_a_lane():
-    assert atomic_passes(warp(0), 32, FERMI) == 32
-
-
-def test_atomics_on_words_of_their_own_banks_take_one_pass():
-    assert atomic_passes(warp(1), 32, FERMI) == 1
-
-
-def test_atomics_of_half_a_warp_go_together_on_1x():
-    assert atomic_passes(warp(16), 20, GT200) == 20
-    assert atomic_passes(warp(1), 32, GT200) == 2
-
-
-def test_atomics_on_neighbouring_words_meet_in_a_bank_in_8_byte_mode():
-    assert atomic_passes(halves(0, 1), 32, KEPLER) == 16
-    assert atomic_passes(halves(0, 1), 32, KEPLER_8) == 32
 
 
 def test_a_what_if_sets_the_mode():

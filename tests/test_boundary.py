@@ -2,7 +2,7 @@
 
 import pytest
 
-from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket, is_monotone
+from tilestamp.experiments.stability.boundary import Boundary, atlas_result, bisect, bracket
 
 
 @pytest.mark.parametrize("scale", ["log", "linear"])
@@ -40,11 +40,6 @@ def test_without_tolerance_left_it_stops_at_neighbouring_floats():
 def test_a_sweep_brackets_the_first_failure():
     assert bracket([1, 2, 4, 8], [False, False, True, True]) == (2, 4)
     assert bracket([1, 2, 4, 8], [False] * 4) == (1, 8)
-
-
-def test_a_sweep_that_works_again_is_not_monotone():
-    assert is_monotone([False, True, True])
-    assert not is_monotone([False, True, False])
 
 
 def test_a_row_says_what_holds_what_breaks_and_what_the_cure_costs():

@@ -7,7 +7,7 @@ import pytest
 
 from tests.naive_ste import catmull_clark
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.scenes.catmull_clark import levels_for_area, limit_positions, subdivide, surface_of
+from tilestamp.simulator.scenes.catmull_clark import limit_positions, subdivide, surface_of
 from tilestamp.simulator.scenes.quad_cage import Cage, refine
 
 CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
@@ -96,16 +96,6 @@ def test_every_edge_of_a_closed_surface_has_two_faces():
     ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     assert (np.sort(surface.edges[surface.corner_edges], axis=1) == ends).all()
     assert (np.bincount(surface.corner_edges) == 2).all()
-
-
-def test_levels_reach_the_area_asked_for():
-    matrix = np.diag([0.5, 0.5, 0.5, 1.0])
-    surface = surface_of(cage(CUBE, CUBE_FACES))
-    level = levels_for_area(surface, matrix, 200, 200, 1.0)
-    seen = corners(subdivide(surface, level))[..., :2] * 50
-    across, along = seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1]
-    areas = np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]) / 2
-    assert 0.2 < areas.max() < 1.1
 
 
 def test_isolated_vertices_are_dropped():

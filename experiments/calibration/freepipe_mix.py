@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from tilestamp.experiments.calibration import cudaraster_mix, sass
-from tilestamp.experiments.calibration.cudaraster_blocks import Events, Run
+from tilestamp.experiments.calibration.cudaraster_blocks import Events, at
 from tilestamp.experiments.calibration.cudaraster_mix import Price
 from tilestamp.experiments.calibration.sass import Block
 
@@ -20,45 +20,41 @@ FUNCTIONS = {"freepipe": "_Z10k_freepipeILi0EEv6FPArgs", "freepipe_early": "_Z10
 WARPS = 8  # of a block: they begin side by side
 
 
-def _run(addresses: str, times: float = 1.0) -> tuple[Run, ...]:
-    return (Run(tuple(int(a, 16) for a in addresses.split()), times),)
-
-
 _TURN = {"freepipe": "13c0 15b0 16b0 17b0 18b0", "freepipe_early": "1590 17e0 1920 1a60 1ba0"}
 _REST = {"freepipe": "f70 1090 10d0 1200 1240 1360", "freepipe_early": "f90 1100 1140 12c0 1300 1470"}
 RUNS: dict[str, Events] = {
     "freepipe": {
-        "WARPS": _run("0 90 1c0"),
-        "SETUP_STEPS": _run("230 2c0 300 490 4d0 610 650 780"),
-        "BOX_STEPS": _run("930 c20 c60"),
-        "ROW_STEPS": _run("e60 1390 1930"),
-        "WARP_STEPS": _run(_TURN["freepipe"], 0.25),
-        "REST_STEPS": _run(_REST["freepipe"], 1 / 3) + _run(_TURN["freepipe"], -0.25),
-        "ATOMIC": _run("1500 15f0 16f0 1800", 0.25),
-        "CLIP_WARPS": _run("19a0 19f0 1a30 1a70 1ab0 1af0 1b30 1d50 1f90 21d0"),
+        "WARPS": at("0 90 1c0"),
+        "SETUP_STEPS": at("230 2c0 300 490 4d0 610 650 780"),
+        "BOX_STEPS": at("930 c20 c60"),
+        "ROW_STEPS": at("e60 1390 1930"),
+        "WARP_STEPS": at(_TURN["freepipe"], 0.25),
+        "REST_STEPS": at(_REST["freepipe"], 1 / 3) + at(_TURN["freepipe"], -0.25),
+        "ATOMIC": at("1500 15f0 16f0 1800", 0.25),
+        "CLIP_WARPS": at("19a0 19f0 1a30 1a70 1ab0 1af0 1b30 1d50 1f90 21d0"),
     },
     "freepipe_early": {
-        "WARPS": _run("0 90 1c0"),
-        "SETUP_STEPS": _run("230 2d0 310 4a0 4e0 620 660 790"),
-        "BOX_STEPS": _run("940 c10 c50"),
-        "ROW_STEPS": _run("ea0 14a0 14d0 1c40"),
-        "WARP_STEPS": _run(_TURN["freepipe_early"], 0.25),
-        "REST_STEPS": _run(_REST["freepipe_early"], 1 / 3) + _run(_TURN["freepipe_early"], -0.25),
-        "READS": _run("16f0 1820 1960 1ab0", 0.25),
-        "ATOMIC": _run("1770 18a0 19e0 1b30", 0.25),
-        "CLIP_WARPS": _run("1cf0 1d40 1d80 1dc0 1e00 1e40 1e80"),
+        "WARPS": at("0 90 1c0"),
+        "SETUP_STEPS": at("230 2d0 310 4a0 4e0 620 660 790"),
+        "BOX_STEPS": at("940 c10 c50"),
+        "ROW_STEPS": at("ea0 14a0 14d0 1c40"),
+        "WARP_STEPS": at(_TURN["freepipe_early"], 0.25),
+        "REST_STEPS": at(_REST["freepipe_early"], 1 / 3) + at(_TURN["freepipe_early"], -0.25),
+        "READS": at("16f0 1820 1960 1ab0", 0.25),
+        "ATOMIC": at("1770 18a0 19e0 1b30", 0.25),
+        "CLIP_WARPS": at("1cf0 1d40 1d80 1dc0 1e00 1e40 1e80"),
     },
 }
 CHAINS: dict[str, Events] = {
     "freepipe": {
-        "CHAIN_ROWS": _run("e60 1390 1930"),
-        "CHAIN_STEPS": _run(_TURN["freepipe"], 0.25),
-        "CHAIN_HITS": _run("1500 15f0 16f0 1800", 0.25),
+        "CHAIN_ROWS": at("e60 1390 1930"),
+        "CHAIN_STEPS": at(_TURN["freepipe"], 0.25),
+        "CHAIN_HITS": at("1500 15f0 16f0 1800", 0.25),
     },
     "freepipe_early": {
-        "CHAIN_ROWS": _run("ea0 14a0 14d0 1c40"),
-        "CHAIN_STEPS": _run(_TURN["freepipe_early"], 0.25),
-        "CHAIN_HITS": _run("16f0 1820 1960 1ab0 1770 18a0 19e0 1b30", 0.25),
+        "CHAIN_ROWS": at("ea0 14a0 14d0 1c40"),
+        "CHAIN_STEPS": at(_TURN["freepipe_early"], 0.25),
+        "CHAIN_HITS": at("16f0 1820 1960 1ab0 1770 18a0 19e0 1b30", 0.25),
     },
 }
 _BEGINS = {"WARPS": 1 / WARPS, "SETUP_STEPS": 1 / WARPS, "BOX_STEPS": 1 / WARPS}

@@ -13,28 +13,24 @@ import sys
 from pathlib import Path
 
 from tilestamp.experiments.calibration import cudaraster_mix, sass
-from tilestamp.experiments.calibration.cudaraster_blocks import Events, Run
+from tilestamp.experiments.calibration.cudaraster_blocks import Events, at
 
 REGISTERS = {"interval": 72, "interleaved": 112}
 SOURCE = "experiments/cuda/motion.cu, nvcc 13.0.88, sm_90: experiments/calibration/motion_mix.py"
 
 
-def _run(addresses: str, lanes: int = 32) -> tuple[Run, ...]:
-    return (Run(tuple(int(a, 16) for a in addresses.split()), 1.0, lanes),)
-
-
 RUNS: dict[str, Events] = {
     "interval": {
-        "WARPS": _run("1a0 230 260 1bb0 1ca0") + _run("1be0", lanes=1),
-        "BOX_WARPS": _run("600 b80 1b60"),
-        "TEST_WARPS": _run("e60 1b10"),
-        "HIT_WARPS": _run("18a0"),
+        "WARPS": at("1a0 230 260 1bb0 1ca0") + at("1be0", lanes=1),
+        "BOX_WARPS": at("600 b80 1b60"),
+        "TEST_WARPS": at("e60 1b10"),
+        "HIT_WARPS": at("18a0"),
     },
     "interleaved": {
-        "WARPS": _run("1d0 240 1970 1a60") + _run("19a0", lanes=1),
-        "BOX_WARPS": _run("660 a80 1880"),
-        "TEST_WARPS": _run("1110 1830"),
-        "HIT_WARPS": _run("1570"),
+        "WARPS": at("1d0 240 1970 1a60") + at("19a0", lanes=1),
+        "BOX_WARPS": at("660 a80 1880"),
+        "TEST_WARPS": at("1110 1830"),
+        "HIT_WARPS": at("1570"),
     },
 }
 LANES = {"BOX_WARPS": "BOXES", "TEST_WARPS": "SAMPLE_TESTS", "HIT_WARPS": "ATOMIC_LANES"}

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from tilestamp.experiments.calibration import cudaraster_mix, sass
-from tilestamp.experiments.calibration.cudaraster_blocks import Events, Run
+from tilestamp.experiments.calibration.cudaraster_blocks import Events, at
 
 REGISTERS = {"sample_raster": 56, "ray_raster": 32}
 TABLES = {"sample_raster": "sample_raster", "ray_raster": '"sample_raster: rays"'}
@@ -22,24 +22,20 @@ UNROLLED = 0.25  # samples a pass
 SIDE_BY_SIDE = 0.5  # of a warp's chain, two in a block
 
 
-def _run(addresses: str, times: float = 1.0) -> Run:
-    return Run(tuple(int(a, 16) for a in addresses.split()), times)
-
-
 RUNS: dict[str, Events] = {
     "sample_raster": {
-        "WARPS": (_run("0 390 440 ca0 1730 1770 17e0 1c10 1c50"),),
-        "SAMPLES": (_run("4e0 1840", UNROLLED),),
-        "ENTRY_WARPS": (_run("d00 d70 1720"),),
-        "TEST_WARPS": (_run("df0 16d0"),),
-        "HIT_WARPS": (_run("1120 1150 1480 1570 1670"),),
+        "WARPS": at("0 390 440 ca0 1730 1770 17e0 1c10 1c50"),
+        "SAMPLES": at("4e0 1840", UNROLLED),
+        "ENTRY_WARPS": at("d00 d70 1720"),
+        "TEST_WARPS": at("df0 16d0"),
+        "HIT_WARPS": at("1120 1150 1480 1570 1670"),
     },
     "ray_raster": {
-        "WARPS": (_run("0 3a0 440 22c0 2320 28f0 2910 2990 2dc0 2e00"),),
-        "SAMPLES": (_run("1cb0 1de0 1ef0 1fc0 2000 2050 2140 2160"), _run("29f0", UNROLLED)),
-        "ENTRY_WARPS": (_run("2360 23d0 28e0"),),
-        "TEST_WARPS": (_run("2430 2890"),),
-        "HIT_WARPS": (_run("25b0 2600 2720 2840"),),
+        "WARPS": at("0 3a0 440 22c0 2320 28f0 2910 2990 2dc0 2e00"),
+        "SAMPLES": at("1cb0 1de0 1ef0 1fc0 2000 2050 2140 2160") + at("29f0", UNROLLED),
+        "ENTRY_WARPS": at("2360 23d0 28e0"),
+        "TEST_WARPS": at("2430 2890"),
+        "HIT_WARPS": at("25b0 2600 2720 2840"),
     },
 }
 LANES = {"WARPS": "WARP_LANES", "TEST_WARPS": "SAMPLE_TESTS", "HIT_WARPS": "SAMPLE_HITS"}

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tilestamp.experiments.calibration import sass
-from tilestamp.experiments.calibration.cudaraster_blocks import Events, Run
+from tilestamp.experiments.calibration.cudaraster_blocks import Events, at
 from tilestamp.experiments.calibration.cudaraster_mix import Price, event_prices, table
 
 ALU_CYCLES = 4.11  # of one step of chain_alu: the machine file's latency.alu_cycles
@@ -38,51 +38,47 @@ PIPELINES = {
 }
 
 
-def _run(addresses: str, times: float = 1.0) -> tuple[Run, ...]:
-    return (Run(tuple(int(a, 16) for a in addresses.split()), times),)
-
-
 RUNS: dict[str, Events] = {
-    "vertex_shading": {"WARPS": _run("0 80 2d0 310 3b0 3f0 600 8a0")},
-    "primitive_assembly": {"WARPS": _run("0 a0")},
+    "vertex_shading": {"WARPS": at("0 80 2d0 310 3b0 3f0 600 8a0")},
+    "primitive_assembly": {"WARPS": at("0 a0")},
     "tile_lists": {
-        "WARPS": _run("0 80"),
-        "FRONT_WARPS": _run("190 2b0"),
-        "ROW_STEPS": _run("380 3b0 12c0"),
-        "BOX_STEPS": _run("540 840 1260"),
-        "EDGE_STEPS": _run("a60 ce0 f60", 1 / 3),
-        "APPENDS": _run("11e0"),
+        "WARPS": at("0 80"),
+        "FRONT_WARPS": at("190 2b0"),
+        "ROW_STEPS": at("380 3b0 12c0"),
+        "BOX_STEPS": at("540 840 1260"),
+        "EDGE_STEPS": at("a60 ce0 f60", 1 / 3),
+        "APPENDS": at("11e0"),
     },
     "tiled_raster": {
-        "WARPS": _run("0 d0 12e0"),
-        "LISTED_WARPS": _run("1b0"),
-        "TEST_WARPS": _run("2a0 4e0 600 12a0"),
-        "HIT_WARPS": _run("6e0 780 7c0 860 8a0 940 980"),
-        "NEARER_WARPS": _run("a40 b10 b50 fd0 1010 10a0 10e0"),
+        "WARPS": at("0 d0 12e0"),
+        "LISTED_WARPS": at("1b0"),
+        "TEST_WARPS": at("2a0 4e0 600 12a0"),
+        "HIT_WARPS": at("6e0 780 7c0 860 8a0 940 980"),
+        "NEARER_WARPS": at("a40 b10 b50 fd0 1010 10a0 10e0"),
     },
     "per_primitive_raster": {
-        "WARPS": _run("0 80"),
-        "FRONT_WARPS": _run("190 270"),
-        "COLUMN_STEPS": _run("3d0 400 1530"),
-        "BOX_STEPS": _run("430 590 690 1500"),
-        "ATOMIC": _run("770 810 850 900 940 9f0 a30 b10 b50 bf0"),
-        "WRITES": _run("c60 1150 1190 1230 1270 14d0"),
-        "TEXTURED_WRITES": _run("1320"),
+        "WARPS": at("0 80"),
+        "FRONT_WARPS": at("190 270"),
+        "COLUMN_STEPS": at("3d0 400 1530"),
+        "BOX_STEPS": at("430 590 690 1500"),
+        "ATOMIC": at("770 810 850 900 940 9f0 a30 b10 b50 bf0"),
+        "WRITES": at("c60 1150 1190 1230 1270 14d0"),
+        "TEXTURED_WRITES": at("1320"),
     },
-    "clear_depth": {"WARPS": _run("0 d0")},
+    "clear_depth": {"WARPS": at("0 d0")},
     "fragment_shading_bilinear": {
-        "WARPS": _run("0 d0"),
-        "DRAWN_WARPS": _run("140 1040 15f0"),
-        "TEXTURED_WARPS": _run("1d0 410 500 5f0 6e0 7d0 8c0 9f0 ae0 bd0 cf0 de0 ec0"),
-        "ZERO_TEXELS": _run("3e0 16b0 1770 17c0 17e0 1820 1cd0 1d20"),
+        "WARPS": at("0 d0"),
+        "DRAWN_WARPS": at("140 1040 15f0"),
+        "TEXTURED_WARPS": at("1d0 410 500 5f0 6e0 7d0 8c0 9f0 ae0 bd0 cf0 de0 ec0"),
+        "ZERO_TEXELS": at("3e0 16b0 1770 17c0 17e0 1820 1cd0 1d20"),
     },
     "fragment_shading_nearest": {
-        "WARPS": _run("0 d0"),
-        "DRAWN_WARPS": _run("140 600 bb0"),
-        "TEXTURED_WARPS": _run("1d0 3e0 4d0 5c0"),
-        "ZERO_TEXELS": _run("4a0 c70 d30 d80 da0 de0 1270 12c0"),
+        "WARPS": at("0 d0"),
+        "DRAWN_WARPS": at("140 600 bb0"),
+        "TEXTURED_WARPS": at("1d0 3e0 4d0 5c0"),
+        "ZERO_TEXELS": at("4a0 c70 d30 d80 da0 de0 1270 12c0"),
     },
-    "copy": {"WARPS": _run("0 d0")},
+    "copy": {"WARPS": at("0 d0")},
 }
 """Blocks that an event runs where no division has to take its slow path."""
 LANES = {

@@ -105,11 +105,6 @@ def bracket(values: Sequence[float], failed: Sequence[bool]) -> tuple[float, flo
     return (values[first - 1], values[first]) if first else (values[0], values[-1])
 
 
-def is_monotone(failed: Sequence[bool]) -> bool:
-    """Whether a sweep, gentle to hard, never works again once it has failed."""
-    return list(failed) == sorted(failed)
-
-
 def boundary_table(boundaries: Sequence[Boundary]) -> pd.DataFrame:
     """One row a boundary, a column a field."""
     return pd.DataFrame([asdict(boundary) for boundary in boundaries])

@@ -12,6 +12,7 @@ Not modelled
 - Machine code of lists and tessellation: they are counted by hand. Compute capability 9.0 alone.
 """
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -89,15 +90,7 @@ def nonlinear(
     whose, torn = _straight(corners, to, samples, simt, options, execute)
     small = Micropolygons(np.empty((len(whose), 3, 3), np.float32), made.patch[whose], made.shade[whose])
     frame = frame_of(samples, small, execute.works, torn=torn)
-    return Frame(
-        frame.image,
-        frame.depth,
-        frame.works,
-        frame.triangle_ids,
-        frame.maps,
-        frame.facts,
-        remarks(REMARKS, frame.facts),
-    )
+    return replace(frame, warnings=remarks(REMARKS, frame.facts))
 
 
 def eye_space(clip: NDArray[np.float64], matrix: NDArray[Any]) -> NDArray[np.float32]:

@@ -110,26 +110,3 @@ def limit_positions(surface: Surface) -> NDArray[np.float64]:
         raise TilestampError("limit positions need quads: subdivide once first")
     limits: NDArray[np.float64] = limit_points(surface.positions, surface.quads, surface.edges, surface.sharpness)
     return limits
-
-
-def levels_for_area(surface: Surface, matrix: ArrayLike, width: int, height: int, area: float) -> int:
-    """Count the steps until no quad in view is larger than ``area`` pixels: a step quarters an area.
-
-    Counted from two steps on, where the quads have the surface's own shape.
-    """
-    refined = subdivide(surface, 2)
-    largest = _largest_area(refined, np.asarray(matrix, np.float64), width, height)
-    return 2 + max(0, int(np.ceil(np.log(max(largest, 1e-12) / area) / np.log(4.0))))
-
-
-def _largest_area(surface: Surface, matrix: NDArray[np.float64], width: int, height: int) -> float:
-    """Area in pixels of the largest quad with a corner on screen."""
-    clip = surface.positions @ matrix[:, :3].T + matrix[:, 3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        screen = clip[:, :2] / clip[:, 3:] * [width / 2.0, -height / 2.0] + [width / 2.0, height / 2.0]
-    inside = (clip[:, 3] > 0) & (screen >= 0).all(axis=1) & (screen < [width, height]).all(axis=1)
-    quads = screen[surface.quads]
-    across, along = quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]
-    areas = np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]) / 2.0
-    seen = inside[surface.quads].any(axis=1) & (clip[:, 3][surface.quads] > 0).all(axis=1)
-    return float(areas[seen].max(initial=0.0))

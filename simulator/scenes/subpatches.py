@@ -12,8 +12,6 @@ from tilestamp.simulator.scenes.scene import Mesh, Patches, Scene
 MOST_TRIANGLES = 500_000  # of a tessellation made for a triangle pipeline
 FINEST_TESSELLATION = 16  # quads along a patch
 
-Nets = NDArray[np.float64]
-
 
 def cut(patches: Patches, along_u: NDArray[np.int64] | int, along_v: NDArray[np.int64] | int = 1) -> Patches:
     """Cut each patch into parts of equal parameter range; the surface stays the same.
