@@ -22,24 +22,13 @@ LOOKS: dict[str, dict[str, Any]] = {  # of bars, by status; solid where it is no
 ROOM = 1.06  # over the longest bar
 
 
-def paired_bars(
-    table: "pd.DataFrame",
-    into: "Into",
-    *,
-    label: str,
-    ours: str,
-    published: str,
-    status: str,
-    title: str,
-    unit: str,
-    known: str = "published",
-) -> "Axes":
+def paired_bars(table: "pd.DataFrame", into: "Into", *, title: str, unit: str, known: str = "published") -> "Axes":
     """Draw a bar for each row: solid where predicted, hatched where fitted, grey where a stand-in was drawn.
 
     Parameters
     ----------
     table : DataFrame
-        A row a cell; columns ``label``, ``ours``, ``published`` (a diamond), ``status``.
+        A row a cell; columns ``label``, ``ours``, ``status``, and the one that ``known`` names (a diamond).
     into : Path, Axes or None
         Where it goes (``tilestamp.reports.style``).
     unit : str
@@ -49,15 +38,15 @@ def paired_bars(
     """
     with figure(into, title, figsize=(8.0, 0.24 * len(table) + 1.3)) as axes:
         places = np.arange(len(table))
-        bars = axes.barh(places, table[ours], color=BLUE, height=0.66)
-        for bar, kind in zip(bars, table[status], strict=True):
+        bars = axes.barh(places, table["ours"], color=BLUE, height=0.66)
+        for bar, kind in zip(bars, table["status"], strict=True):
             bar.set(**LOOKS.get(kind, {}))
-        (points,) = axes.plot(table[published], places, **PUBLISHED)
-        axes.set_yticks(places, table[label], fontsize=8)
-        axes.set(xlabel=unit, xlim=(0.0, ROOM * max(table[ours].max(), table[published].max())))
+        (points,) = axes.plot(table[known], places, **PUBLISHED)
+        axes.set_yticks(places, table["label"], fontsize=8)
+        axes.set(xlabel=unit, xlim=(0.0, ROOM * max(table["ours"].max(), table[known].max())))
         axes.invert_yaxis()
         axes.grid(visible=False, axis="y")
-        legend_beside(axes, {known: points, **dict(zip(table[status], bars, strict=True))})
+        legend_beside(axes, {known: points, **dict(zip(table["status"], bars, strict=True))})
     drawn: Axes = axes
     return drawn
 

@@ -84,10 +84,9 @@ def test_no_legend_lies_on_the_axes():
 
 
 def test_bars_show_what_is_published_and_the_status():
-    data = pd.DataFrame({"cell": ["a", "b", "c"], "ours": [1.0, 2.0, 3.0], "known": [1.5, 2.5, 9.0]})
+    data = pd.DataFrame({"label": ["a", "b", "c"], "ours": [1.0, 2.0, 3.0], "known": [1.5, 2.5, 9.0]})
     data["status"] = ["predicted", "fitted", "stand-in"]
-    columns = {"label": "cell", "ours": "ours", "published": "known", "status": "status"}
-    drawn = paired_bars(data, axes(), **columns, title="T", unit="ms")
+    drawn = paired_bars(data, axes(), title="T", unit="ms", known="known")
     assert list(drawn.lines[0].get_xdata()) == [1.5, 2.5, 9.0]
     assert len({patch.get_facecolor() for patch in drawn.patches}) == 3
     assert drawn.get_xlim()[1] > 9.0  # no bar and no point at the frame

@@ -1,18 +1,16 @@
 """Table 2: three models, two screens, two bounds, one and four samples a pixel (Eisenacher & Loop 2010)."""
 
 from collections.abc import Sequence
-from pathlib import Path
-
-import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import SOURCE, frame, overhead_ms, stand_in_warnings
+from tilestamp.experiments.harness.cell_bars import cell_bars
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
-from tilestamp.reports.bars import paired_bars
+from tilestamp.experiments.harness.result import Cell, Result
 
 QUESTION = "How long does a frame of each model take, on two screens, with two bounds, at one and four samples a pixel?"
 COUNT_AIM, TIME_AIM = 0.03, 0.15
+FIGURE = cell_bars("totals", lambda cell: cell.unit == "ms", "Total time of a frame, GTX 280", "time [ms]")
 
 
 def run(progress: Progress) -> Result:
@@ -45,7 +43,7 @@ def run(progress: Progress) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells),
-        figures=[CellFigure("totals", _draw)],
+        figures=[FIGURE],
         notes=[
             (
                 "The system overhead of 4.6 ms is Table 3's at 1600x1200; 1.87 ms of it every frame has (fitted to the "
@@ -70,19 +68,3 @@ def _answer(cells: Sequence[Cell]) -> str:
         f"Between {ours[0]:.1f} and {ours[-1]:.0f} ms by the model, between {theirs[0]:.1f} and {theirs[-1]:.0f} ms as "
         "published."
     )
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    times = [c for c in cells if c.unit == "ms"]
-    table = pd.DataFrame(
-        {
-            "label": [f"{c.row}, {c.column}" for c in times],
-            "ours": [c.ours for c in times],
-            "published": [c.published for c in times],
-            "status": [c.status for c in times],
-        }
-    )
-    paired_bars(
-        table, path, label="label", ours="ours", published="published", status="status",
-        title="Total time of a frame, GTX 280", unit="time [ms]",
-    )  # fmt: skip

@@ -10,20 +10,18 @@ vertex is shared.
 """
 
 import os
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
+from tilestamp.experiments.harness.cell_bars import cell_bars
 from tilestamp.experiments.harness.published import published
-from tilestamp.experiments.harness.result import Cell
+from tilestamp.experiments.harness.result import Cell, CellFigure
 from tilestamp.experiments.laine2011.heavy_tail import Places, heavy_tail_scene
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.remembered import remembered
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.simulation import simulate
@@ -168,10 +166,7 @@ def warning() -> str:
     )
 
 
-def draw_times(title: str, cells: Sequence[Cell], path: Path) -> None:
-    """Draw times of frames beside the published ones."""
-    rows = [{"cell": f"{c.row}, {c.column}", "ms": c.ours, "published": c.published, "status": c.status} for c in cells]
-    paired_bars(
-        pd.DataFrame(rows), path, label="cell", ours="ms", published="published", status="status",
-        title=f"{title}, generated scenes, GTX 480 (published: on the real ones)", unit="time of a frame [ms]",
-    )  # fmt: skip
+def time_bars(name: str, of: Callable[[Cell], bool], title: str) -> CellFigure:
+    """Times of frames beside the published ones."""
+    title = f"{title}, generated scenes, GTX 480 (published: on the real ones)"
+    return cell_bars(name, of, title, "time of a frame [ms]")

@@ -1,22 +1,26 @@
 """Slides: memory of setup data and queues, five scenes (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
-import pandas as pd
-
+from tilestamp.experiments.harness.cell_bars import cell_bars
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.laine2011.generated import draw, frame_name, scenes, statistics, warning
 from tilestamp.experiments.laine2011.sweep import SOURCE
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.stages.laine2011.triangle_setup import SUBTRIANGLE_BYTES
 
 QUESTION = "How much memory do set-up data and queues take?"
 SETUP_AIM, QUEUE_FACTOR = 0.05, 1.5
 WIDTH, HEIGHT = 1024, 768  # assumed: the slides do not say
 QUEUES = {"bin queues": "bin_queues_MB", "tile queues": "tile_queues_MB"}
+FIGURE = cell_bars(
+    "memory",
+    lambda cell: cell.column != "setup data",
+    "Memory of the queues, generated scenes (model; published on the real ones)",
+    "memory [MB]",
+    lambda cell: f"{cell.row} {cell.column}",
+)
 
 
 def run(progress: Progress) -> Result:
@@ -50,7 +54,7 @@ def run(progress: Progress) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells),
-        figures=[CellFigure("memory", _draw)],
+        figures=[FIGURE],
         notes=[
             (
                 f"Queues: aim a factor {QUEUE_FACTOR}. The release has 16 bin streams, the slides speak of 15, one an "
@@ -77,16 +81,3 @@ def queue_cell(scene: str, queue: str, asked: float, ours: float) -> Cell:
     """One queue; its aim is a factor, so that too little is judged like too much."""
     aim = QUEUE_FACTOR - 1.0 if ours > asked else 1.0 - 1.0 / QUEUE_FACTOR
     return Cell(scene, queue, "MB", published=asked, ours=ours, aim=aim, frame=frame_name(scene, WIDTH, HEIGHT))
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    rows = [
-        {"cell": f"{c.row} {c.column}", "ours": c.ours, "published": c.published, "status": c.status}
-        for c in cells
-        if c.column != "setup data"
-    ]
-    table = pd.DataFrame(rows)
-    title = "Memory of the queues, generated scenes (model; published on the real ones)"
-    paired_bars(
-        table, path, label="cell", ours="ours", published="published", status="status", title=title, unit="memory [MB]",
-    )  # fmt: skip

@@ -1,23 +1,21 @@
 """Slides: five scenes, three sizes: hardware, CudaRaster and FreePipe on a GTX 480 (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
 
 import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.laine2011.generated import (
     PIPELINES,
     VARIABLE,
     Statistics,
     draw,
-    draw_times,
     frame_name,
     scenes,
     sizes,
+    time_bars,
     warning,
 )
 from tilestamp.experiments.laine2011.sweep import SOURCE
@@ -52,8 +50,8 @@ def run(progress: Progress) -> Result:
         cells=cells,
         answer=_answer(cells),
         figures=[
-            CellFigure("pipelines", partial(_draw, PIPELINES[:2])),
-            CellFigure("freepipe", partial(_draw, PIPELINES[2:])),
+            time_bars("pipelines", lambda cell: cell.column in PIPELINES[:2], "Frame time"),
+            time_bars("freepipe", lambda cell: cell.column in PIPELINES[2:], "Frame time"),
         ],
         notes=[
             (
@@ -120,7 +118,3 @@ def statistic_cells(scene: Statistics) -> list[Cell]:
         ),
         Cell(scene.name, "pixels a triangle", "", published=scene.pixels, ours=pixels, status="reported"),
     ]
-
-
-def _draw(pipelines: tuple[str, ...], cells: Sequence[Cell], path: Path) -> None:
-    draw_times("Frame time", [cell for cell in cells if cell.column in pipelines], path)

@@ -1,12 +1,11 @@
 """Table 2: samples a pixel in three modes, FairyForest and Buddha, GTX 480 (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
-from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, draw_times, everything, frame_name, warning
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.laine2011.generated import FAIRY, VARIABLE, draw, everything, frame_name, time_bars, warning
 from tilestamp.experiments.laine2011.sweep import HEIGHT, SOURCE, WIDTH
 
 QUESTION = "What do more samples a pixel cost?"
@@ -33,7 +32,7 @@ def run(progress: Progress) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells),
-        figures=[CellFigure("samples", _draw)],
+        figures=[time_bars("samples", lambda cell: cell.unit == "ms", "Samples a pixel")],
         notes=[
             (
                 "One number of all that several samples cost is fitted, on one cell: FairyForest, depth, no blend, 8 "
@@ -92,7 +91,3 @@ def emits_cell() -> Cell:
         ours=ours,
         frame=frame_name(FAIRY),
     )
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    draw_times("Samples a pixel", [cell for cell in cells if cell.unit == "ms"], path)

@@ -1,18 +1,16 @@
 """Table 3: stage times, memory and the profiler's counters, Buddha, first camera, GTX 480 (Laine & Karras 2011)."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
+from tilestamp.experiments.harness.cell_bars import cell_bars
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
+from tilestamp.experiments.harness.result import Cell, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, WIDTH
 from tilestamp.models.used import note
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene, load_scene
 from tilestamp.simulator.scenes.library import STAND_INS
@@ -33,6 +31,13 @@ KERNELS = {
 }
 SEGMENTS = {"numSubtris": "setup data", "numBinSegs": "bin queues", "numTileSegs": "tile queues"}
 COUNTER_AIM, TIME_AIM = 0.01, 0.25
+FIGURE = cell_bars(
+    "counters",
+    lambda cell: cell.unit == "%",
+    "Counters of the profiler that are shares, Buddha, 1024x768",
+    "share [%]",
+    lambda cell: cell.column,
+)
 
 
 def run(progress: Progress) -> Result:
@@ -65,7 +70,7 @@ def run(progress: Progress) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(name, cells),
-        figures=[CellFigure("counters", _draw)],
+        figures=[FIGURE],
         notes=notes,
         warnings=[] if name == FULL else [reduced_warning()],
     )
@@ -161,17 +166,3 @@ def counter_cells(made: Run, status: Status) -> list[Cell]:
             )
         )
     return cells
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    rows = [
-        {"counter": c.column, "ours": c.ours, "published": c.published, "status": c.status}
-        for c in cells
-        if c.unit == "%"
-    ]
-    table = pd.DataFrame(rows)
-    title = "Counters of the profiler that are shares, Buddha, 1024x768"
-    paired_bars(
-        table, path, label="counter", ours="ours", published="published", status="status", title=title,
-        unit="share [%]",
-    )  # fmt: skip

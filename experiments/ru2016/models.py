@@ -1,12 +1,12 @@
 """Ru 2016, tiles against primitives: eight models, tiled with and without culling, and per primitive."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result, Status
+from tilestamp.experiments.harness.cell_bars import cell_bars
+from tilestamp.experiments.harness.result import Cell, Result, Status
 from tilestamp.experiments.ru2016.setting import (
     DEGREE_VIEW,
     INTEROP,
@@ -20,7 +20,6 @@ from tilestamp.experiments.ru2016.setting import (
     published,
     waits_ms,
 )
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 
 QUESTION = "Are tiles faster than one thread a triangle?"
@@ -34,6 +33,13 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
 AIM = 0.5
 TIE = 0.05  # published times as near as this have no winner
 VIEWED = ("triangle", "box", "CesiumMilkTruck", "flower")  # also drawn with 45 degrees
+FIGURE = cell_bars(
+    "times",
+    lambda cell: cell.unit == "ms",
+    "Eight models, three ways (GT 750M)",
+    "ms",
+    lambda cell: f"{cell.row} {cell.column}".replace("_", " "),
+)
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -63,7 +69,7 @@ def run(progress: Callable[[str], None]) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells),
-        figures=[CellFigure("times", _draw)],
+        figures=[FIGURE],
         notes=notes,
         warnings=missing(absent),
         tables=tables,
@@ -152,23 +158,3 @@ def _views() -> pd.DataFrame:
                 method = column.removesuffix("_ms")
                 rows.append({"model": name, "method": method, "fov": DEGREE_VIEW, "frame_ms": frame_ms(frame)})
     return pd.DataFrame(rows)
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    """Draw ours beside his."""
-    bars = pd.DataFrame(
-        [
-            {
-                "cell": f"{c.row} {c.column}".replace("_", " "),
-                "ours": c.ours,
-                "published": c.published,
-                "status": c.status,
-            }
-            for c in cells
-            if c.unit == "ms"
-        ]
-    )
-    paired_bars(
-        bars, path, label="cell", ours="ours", published="published", status="status",
-        title="Eight models, three ways (GT 750M)", unit="ms",
-    )  # fmt: skip

@@ -1,11 +1,11 @@
 """Ru 2016, performance against tile size: occupancy and time of the engine at tiles of 4, 8, 16, 32."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.harness.cell_bars import cell_bars
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.ru2016.setting import (
     INTEROP,
     MACHINE,
@@ -19,7 +19,6 @@ from tilestamp.experiments.ru2016.setting import (
 )
 from tilestamp.models.machine import load_machine
 from tilestamp.models.occupancy import residency
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 
 QUESTION = "Which tile size is the fastest, and what occupancy does each allow?"
@@ -28,6 +27,9 @@ SLOW = True  # with what it needs compiled, more than the first run should take
 REGISTERS = 63  # published
 MODEL = "2CylinderEngine"
 PLACE = frame_name(MODEL)
+FIGURE = cell_bars(
+    "time", lambda cell: cell.column == "time", "The engine by tile size (GT 750M)", "ms", lambda cell: cell.row
+)
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -67,7 +69,7 @@ def run(progress: Callable[[str], None]) -> Result:
         source=SOURCE,
         cells=cells + rows,
         answer=f"In the order of their times: tiles of {order} pixels." if rows else "",
-        figures=[CellFigure("time", _draw)] if rows else [],
+        figures=[FIGURE] if rows else [],
         notes=notes,
         warnings=warnings,
         tables={"runs": runs},
@@ -110,16 +112,6 @@ def _notes(times: dict[int, Run]) -> list[str]:
             "and 32x32 it holds 4 lists and 1, each longer than that of any tile inside it."
         ),
     ]
-
-
-def _draw(cells: Sequence[Cell], path: Path) -> None:
-    """Draw ours beside his."""
-    rows = [c for c in cells if c.column == "time"]
-    bars = pd.DataFrame([{"tile": c.row, "ours": c.ours, "published": c.published, "status": c.status} for c in rows])
-    paired_bars(
-        bars, path, label="tile", ours="ours", published="published", status="status",
-        title="The engine by tile size (GT 750M)", unit="ms",
-    )  # fmt: skip
 
 
 def _row(tile: int, frame: Run) -> dict[str, object]:

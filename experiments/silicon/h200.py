@@ -121,15 +121,9 @@ def _figures(table: pd.DataFrame) -> list[Figure]:
     rows = table[(table.quantity == TIME) & (table.kernel == "k_raster")]
     for scene, group in rows.groupby("scene", sort=False):
         bars = group.assign(label=[f"{t} px, {s} spp" for t, s in zip(group.tile, group.spp, strict=True)])
-        figures.append(Figure(f"raster-{scene}", partial(_bars, bars, str(scene))))
+        draw = partial(paired_bars, bars, title=f"Tile raster of {scene} (H200)", unit="us", known="measured")
+        figures.append(Figure(f"raster-{scene}", draw))
     return figures
-
-
-def _bars(bars: pd.DataFrame, scene: str, path: Path) -> None:
-    paired_bars(
-        bars, path, label="label", ours="ours", published="measured", status="status",
-        title=f"Tile raster of {scene} (H200)", unit="us", known="measured",
-    )  # fmt: skip
 
 
 def _worst(table: pd.DataFrame) -> list[str]:

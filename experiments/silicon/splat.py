@@ -7,7 +7,6 @@ ellipses, on two screens. A frame follows frames like it, so caches hold what th
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any, cast
 
 import pandas as pd
@@ -54,7 +53,19 @@ def run(progress: Callable[[str], None]) -> Result:
         title=TITLE,
         source=SOURCE,
         cells=cells(table),
-        figures=[Figure(f"tiles-{name}", partial(_bars, rows, str(name))) for name, rows in _frames(table)],
+        figures=[
+            Figure(
+                f"tiles-{name}",
+                partial(
+                    paired_bars,
+                    rows.assign(status="predicted", label=rows.config),
+                    title=f"Frames of {name} (H200)",
+                    unit="us",
+                    known="measured",
+                ),
+            )
+            for name, rows in _frames(table)
+        ],
         notes=[right, *sentences(table)],
         warnings=missing,
         tables={"all": table, "kernels": by_kernel(table), "fastest-tile": tiles},
@@ -145,10 +156,3 @@ def _cell(row: dict[str, Any]) -> Cell:
 def _frames(table: pd.DataFrame) -> Iterator[tuple[Any, pd.DataFrame]]:
     """Frames of each scene."""
     yield from table[table.quantity == FRAME_TIME].groupby("scene", sort=False)
-
-
-def _bars(rows: pd.DataFrame, scene: str, path: Path) -> None:
-    paired_bars(
-        rows.assign(status="predicted"), path, label="config", ours="ours", published="measured", status="status",
-        title=f"Frames of {scene} (H200)", unit="us", known="measured",
-    )  # fmt: skip

@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.cell_bars import cell_bars
+from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.zhang2025.setting import BASE_MHZ, CANDIDATES, SOURCE, bunny, draw, profiled, published
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
 from tilestamp.models.timing import Timing
-from tilestamp.reports.bars import paired_bars
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.stages.zhang2025.primitive_compaction import most_triangles
 
@@ -21,6 +21,14 @@ AIM = 0.5
 BASE = "(base clock)"  # of the machines as the profiler locks them (setting.profiled)
 MEMORY_BOUND = 75.0  # percent of the peak
 OPTIMIZED = ("CoarseRasterizer", "FineRasterizer", "PixelShader", "ROP", "StreamingToFrameBuffer")
+AFTER = f"{CANDIDATES[0]} {BASE} after"
+FIGURE = cell_bars(
+    "after",
+    lambda cell: cell.column == AFTER and cell.row != "sum",
+    f"Kernels after optimization ({CANDIDATES[0]} {BASE})",
+    "us",
+    lambda cell: cell.row,
+)
 
 
 def run(progress: Callable[[str], None]) -> Result:
@@ -70,7 +78,7 @@ def run(progress: Callable[[str], None]) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells, best),
-        figures=[_figure(cells)],
+        figures=[FIGURE],
         notes=notes,
     )
 
@@ -175,21 +183,3 @@ def _traffic(table: pd.DataFrame, timings: dict[str, Timing]) -> list[Cell]:
         )
         for kernel, row in bound.iterrows()
     ]
-
-
-def _figure(cells: list[Cell]) -> Figure:
-    """Bars of all kernels after optimization on the first candidate."""
-    column = f"{CANDIDATES[0]} {BASE} after"
-    rows = [
-        {"kernel": c.row, "ours": c.ours, "published": c.published, "status": c.status}
-        for c in cells
-        if c.column == column and c.row != "sum"
-    ]
-    bars = pd.DataFrame(rows)
-    return Figure(
-        "after",
-        lambda path: paired_bars(
-            bars, path, label="kernel", ours="ours", published="published", status="status",
-            title=f"Kernels after optimization ({CANDIDATES[0]} {BASE})", unit="us",
-        ),
-    )  # fmt: skip
