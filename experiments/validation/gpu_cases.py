@@ -149,9 +149,10 @@ def _triangles(simt: Simt) -> Iterator[GpuCase]:
     start = _launcher(_triangle_code, "triangle_setup", work.grid, work.block, *inputs, kept, headers, planes, clipped)
 
     def different() -> float:
-        ours = np.concatenate([setup.headers[:n].view(np.uint32), setup.misc[:n, None], setup.planes[:n]], axis=1)
-        theirs = np.concatenate([cp.asnumpy(headers), cp.asnumpy(planes)], axis=1)
         seen = setup.subtriangles > 0
+        records = setup.planes[np.where(seen, setup.records[:n], 0)]
+        ours = np.concatenate([setup.headers[:n].view(np.uint32), setup.misc[:n, None], records], axis=1)
+        theirs = np.concatenate([cp.asnumpy(headers), cp.asnumpy(planes)], axis=1)
         wrong = (cp.asnumpy(kept) != setup.subtriangles) | (seen & (ours != theirs).any(axis=1))
         return float(wrong.mean()) + float(clipped[0])
 

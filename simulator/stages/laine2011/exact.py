@@ -133,9 +133,8 @@ def greater(a: Any, b: Any) -> Any:
 @kernel(lent=True)
 def round_to_int32(value: Any) -> Any:
     """Float to int32: half to even, saturating, NaN to 0; returned as int64."""
-    if not value == value:  # noqa: PLR0124, SIM201 - NaN, and nothing else, differs from itself
-        return np.int64(0)
-    wide = min(max(np.float64(value), -2147483648.0), 2147483647.0)
+    wide = np.float64(value) if value == value else 0.0  # noqa: PLR0124 - NaN differs from itself
+    wide = min(max(wide, -2147483648.0), 2147483647.0)
     return np.int64((wide + _ROUND) - _ROUND)
 
 

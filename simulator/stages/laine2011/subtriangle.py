@@ -68,42 +68,68 @@ def snap(x: Any, y: Any, z: Any, w: Any, u: Any, v: Any, view: View) -> Any:
     return Corner(sx, sy, inverse, depth_at(z, inverse), w, u, v)
 
 
-@kernel(lent=True)
-def _holds_site(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, x: int, y: int, sign: int) -> Any:
-    ax, bx, cx, ay, by, cy = ax - x, bx - x, cx - x, ay - y, by - y, cy - y
-    ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
-    return sign * ab >= 0 and sign * bc >= 0 and sign * ca >= 0
+@kernel(lent=True, inline=True)
+def _cross(ax: Any, ay: Any, bx: Any, by: Any) -> Any:
+    """Cross product of two vectors, as int32 arithmetic has it."""
+    return np.int32(ax * by - ay * bx)
 
 
 @kernel(lent=True, inline=True)
-def _between_samples(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View, sign: int) -> Any:
-    """Whether the triangle surely holds no site of the sample grid; and the sites that were looked at, 0 to 2."""
-    q = SUBPIXELS >> view.log_samples
-    x, y = view.half_width - q // 2, view.half_height - q // 2
-    low_x, high_x = wrap_int32(min(ax, bx, cx) + q - 1 + x) & -q, wrap_int32(max(ax, bx, cx) + x) & -q
-    low_y, high_y = wrap_int32(min(ay, by, cy) + q - 1 + y) & -q, wrap_int32(max(ay, by, cy) + y) & -q
-    if low_x > high_x or low_y > high_y:
-        return True, 0
-    spread = (high_x - low_x) + (high_y - low_y)
-    if spread > q:
-        return False, 0
-    holds = _holds_site(ax, ay, bx, by, cx, cy, low_x - x, low_y - y, sign)
-    if spread == 0 or holds:
-        return not holds, 1
-    return not _holds_site(ax, ay, bx, by, cx, cy, high_x - x, high_y - y, sign), 2
+def _holds(ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, sign: Any) -> Any:
+    """Whether the origin is inside a triangle close to it; ``sign`` -1 where that is clockwise, else 0."""
+    ab, bc, ca = _cross(ax, ay, bx, by), _cross(bx, by, cx, cy), _cross(cx, cy, ax, ay)
+    return (np.int32((ab ^ sign) - sign) | np.int32((bc ^ sign) - sign) | np.int32((ca ^ sign) - sign)) >= 0
 
 
 @kernel(lent=True, inline=True)
-def cull(ax: int, ay: int, bx: int, by: int, cx: int, cy: int, view: View) -> Any:
-    """Outcome of the culls that follow snapping, twice the area, and the sample sites that were looked at.
+def cull(ax: Any, ay: Any, bx: Any, by: Any, cx: Any, cy: Any, view: View) -> Any:
+    """Cull a snapped triangle, without a branch, so that compiled code takes eight of them at a time.
 
-    The area is in 1/256 square pixels, counter-clockwise positive, as int32 arithmetic has it.
+    Parameters
+    ----------
+    ax, ay, bx, by, cx, cy : int32
+    view : View
+
+    Returns
+    -------
+    area : int32
+        Twice the area in 1/256 square pixels, counter-clockwise positive.
+    backface, between, one, two : bool
+        No area or turned away; else whether it surely holds no site of the sample grid, and whether one site, and the
+        second of two, are looked at for that.
     """
-    area = wrap_int32((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
-    if area == 0 or (area < 0 and view.cull_backfaces):
-        return BACKFACE, area, 0
-    between, sites = _between_samples(ax, ay, bx, by, cx, cy, view, 1 if area > 0 else -1)
-    return BETWEEN if between else KEPT, area, sites
+    i32 = np.int32
+    q = SUBPIXELS >> view.log_samples
+    x, y = i32(view.half_width - q // 2), i32(view.half_height - q // 2)
+    area = _cross(i32(bx - ax), i32(by - ay), i32(cx - ax), i32(cy - ay))
+    backface = (area == 0) | ((area < 0) & view.cull_backfaces)
+    low_x, high_x = i32(min(ax, bx, cx) + x + (q - 1)) & -q, i32(max(ax, bx, cx) + x) & -q
+    low_y, high_y = i32(min(ay, by, cy) + y + (q - 1)) & -q, i32(max(ay, by, cy) + y) & -q
+    empty = (low_x > high_x) | (low_y > high_y)
+    wide, high = np.uint32(high_x - low_x), np.uint32(high_y - low_y)
+    one = ((wide | high) <= q) & ((wide & high) == 0) & (not empty) & (not backface)
+    x0, y0, x1, y1 = i32(low_x - x), i32(low_y - y), i32(high_x - x), i32(high_y - y)
+    sign = area >> 31
+    first = _holds(i32(ax - x0), i32(ay - y0), i32(bx - x0), i32(by - y0), i32(cx - x0), i32(cy - y0), sign)
+    second = _holds(i32(ax - x1), i32(ay - y1), i32(bx - x1), i32(by - y1), i32(cx - x1), i32(cy - y1), sign)
+    missed = one & (not first)
+    between = ((not backface) & empty) | (missed & (not second))
+    return area, backface, between, one, missed & ((wide | high) != 0)
+
+
+@kernel(lent=True, inline=True)
+def area_of(a: Corner, b: Corner, c: Corner) -> Any:
+    """Twice the area of a triangle of three corners, as of ``cull``."""
+    i32 = np.int32
+    return _cross(i32(b.sx - a.sx), i32(b.sy - a.sy), i32(c.sx - a.sx), i32(c.sy - a.sy))
+
+
+@kernel(lent=True)
+def survives(a: Corner, b: Corner, c: Corner, view: View) -> Any:
+    """Whether a triangle of three corners is neither turned away nor between samples."""
+    i32 = np.int32
+    _, backface, between, _, _ = cull(i32(a.sx), i32(a.sy), i32(b.sx), i32(b.sy), i32(c.sx), i32(c.sy), view)
+    return not (backface or between)
 
 
 @kernel(lent=True)
@@ -174,11 +200,20 @@ def _store_plane(
 
 @kernel(error_model="numpy", lent=True)
 def store_attribute_planes(
-    a: Corner, b: Corner, c: Corner, mantissa: int, shift: int, view: View, planes: Any, slot: int
-) -> None:
-    """Write the planes of 1/w, u/w and v/w."""
+    a: Corner, b: Corner, c: Corner, whole: bool, turned: bool, mantissa: int, shift: int, view: View, planes: Any,
+    slot: int,
+) -> None:  # fmt: skip
+    """Write the planes of 1/w, u/w and v/w.
+
+    Of a triangle that is ``whole``, u and v are 1 at one corner and 0 at the others; ``turned``: that of u is c.
+    """
     scale = min(a.w, b.w, c.w) * BARYCENTRIC_SCALE
     w0, w1, w2 = scale * a.inverse_w, scale * b.inverse_w, scale * c.inverse_w
+    u, v, zero = np.int64(7), np.int64(10), np.float32(0)
     _store_plane(w0, w1, w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(4))
-    _store_plane(a.u * w0, b.u * w1, c.u * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(7))
-    _store_plane(a.v * w0, b.v * w1, c.v * w2, a, b, c, mantissa, shift, view, planes, slot, np.int64(10))
+    if whole:
+        _store_plane(zero, w1, zero, a, b, c, mantissa, shift, view, planes, slot, v if turned else u)
+        _store_plane(zero, zero, w2, a, b, c, mantissa, shift, view, planes, slot, u if turned else v)
+        return
+    _store_plane(a.u * w0, b.u * w1, c.u * w2, a, b, c, mantissa, shift, view, planes, slot, u)
+    _store_plane(a.v * w0, b.v * w1, c.v * w2, a, b, c, mantissa, shift, view, planes, slot, v)

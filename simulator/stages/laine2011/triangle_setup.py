@@ -9,32 +9,32 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import borrow
-from tilestamp.simulator.stages.laine2011.screen_vertices import BEYOND, Screen, screen_vertices
-from tilestamp.simulator.stages.laine2011.subtriangle import ABSENT, CLIPPED, KEPT, View
+from tilestamp.simulator.stages.laine2011.screen_vertices import Screen, screen_vertices
+from tilestamp.simulator.stages.laine2011.subtriangle import ABSENT, KEPT, View
 from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
-    FIRST_OUTSIDE,
-    ONE_SITE,
-    TWO_SITES,
+    SINGLE,
     WARP,
     TriangleSetupEvent,
-    count_clipped,
     count_vertices,
     count_warp,
+    forget_warp,
     new_counting,
+    note_vertices,
 )
+from tilestamp.simulator.stages.laine2011.triangle_setup_outcome import warp_outcomes
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
     Scratch,
     Setup,
     clip_and_store,
     new_scratch,
     store_whole,
-    whole_outcome,
 )
 from tilestamp.simulator.stages.laine2011.triangle_setup_streams import setup_streams
 from tilestamp.simulator.work import Work
@@ -47,87 +47,135 @@ SLACK = 4096  # sub-triangle slots beyond one for each triangle, at first
 MAX_SUBTRIANGLES = 2**24
 MAX_SIZE = 2048  # pixels along an axis: 16 bins of 16 tiles of 8 pixels
 SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64 or 16
+_WHOLE, _CUT = (
+    0,
+    1,
+)  # columns of the masks of warps: lanes with a sub-triangle at their own slot, uncut or cut by clipping
 _PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
 
 
 @kernel(lent=True)
-def _setup_range(
+def _outcome_range(
     begin: int,
     end: int,
     screen: Screen,
     positions: Any,
     triangles: Any,
+    plain: bool,
     view: View,
     simt: Simt,
     out: Setup,
+    masks: Any,
     scratch: Scratch,
     counting: Any,
     vertices: Any,
     table: Any,
-) -> None:
-    """All triangles of some whole blocks; those with two or more sub-triangles are only counted here.
-
-    Records follow each other from the first triangle's own place on.
-    """
-    record = np.int64(begin)
+) -> Any:
+    """Outcomes of all triangles of some whole blocks; returns how many have their sub-triangle at their own slot."""
+    lanes, single = counting.lanes, 0
     for warp in range(begin, end, WARP):
-        last = min(warp + WARP, end)
-        for t in range(warp, last):
-            outcome, area, sites = whole_outcome(screen, triangles, t, view)
-            kept = fan = 0
-            if outcome == KEPT:
-                kept = 1
-                store_whole(screen, positions, triangles, t, record, area, view, out)
-            elif outcome == CLIPPED:
-                kept, fan = clip_and_store(scratch, positions, view, out, np.int64(-1), record, t, triangles)
-            out.subtriangles[t] = kept
-            record += kept == 1
-            if table is not None:
-                bit = 1 << (t - warp)
-                counting.lanes[outcome] |= bit
-                if sites > 0:
-                    counting.lanes[ONE_SITE] |= bit
-                    counting.lanes[TWO_SITES] |= bit if sites > 1 else 0
-                if outcome == CLIPPED:
-                    count_clipped(counting, bit, kept, fan, scratch.steps)
-                if outcome != ABSENT and screen.codes[triangles[t, 0]] & BEYOND:
-                    counting.lanes[FIRST_OUTSIDE] |= bit
+        n = min(WARP, end - warp)
+        warp_outcomes(screen, positions, triangles, warp, n, plain, view, scratch, counting, out)
+        mask = masks[warp // WARP]
+        mask[_WHOLE], mask[_CUT] = lanes[KEPT], lanes[SINGLE]
+        single += popcount(np.uint64(lanes[KEPT] | lanes[SINGLE]))
         if table is not None:
-            row = table[warp // BLOCK]
-            count_vertices(row, vertices, counting, triangles, warp, last - warp, warp // BLOCK, simt)
-            count_warp(row, counting, last - warp, view, out, simt)
+            row, second = table[warp // BLOCK], warp // WARP % 2
+            corners = triangles[3 * warp : 3 * (warp + n)]
+            note_vertices(counting.lines, corners, n, second, lanes[ABSENT])
+            count_warp(row, counting, n, view, out, simt)
+            if second or warp + WARP >= end:
+                count_vertices(row, vertices, counting.lines, simt)
+        forget_warp(counting)
+    return single
 
 
 @kernel
-def _setup_part(
+def _outcome_part(
     part: int,
     parts: int,
     screen: Screen,
     positions: Any,
     triangles: Any,
+    plain: bool,
     view: View,
     simt: Simt,
     out: Setup,
+    masks: Any,
     vertices: Any,
     table: Any,
-) -> None:
+) -> Any:
     """Take a share of the blocks, through arrays without reference counts."""
-    blocks = (triangles.shape[0] + BLOCK - 1) // BLOCK
-    begin, end = blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles.shape[0])
+    begin, end = _share(part, parts, out.subtriangles.size)
     scratch, counting = new_scratch(), new_counting()
     screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
-    lent, counted = borrow(scratch), (borrow(counting), borrow(vertices[part]))
-    _setup_range(begin, end, screen, positions, triangles, view, simt, out, lent, *counted, borrow(table))
+    lent, counted = (borrow(masks), borrow(scratch)), (borrow(counting), borrow(vertices[part]))
+    single = _outcome_range(begin, end, screen, positions, triangles, plain, view, simt, out, *lent, *counted, table)
     scratch.steps[0] = counting.most[0] = 0  # the owners live to here
+    return single
+
+
+@kernel(lent=True)
+def _store_range(
+    begin: int,
+    end: int,
+    record: int,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    out: Setup,
+    masks: Any,
+    scratch: Scratch,
+) -> None:
+    """Write the sub-triangles that lie at the own slots of their triangles, records from ``record`` on."""
+    for warp in range(begin // WARP, (end + WARP - 1) // WARP):
+        left = np.uint64(masks[warp, _WHOLE] | masks[warp, _CUT])
+        while left:
+            lane = lowest_bit(left)
+            left &= left - np.uint64(1)
+            t = warp * WARP + lane
+            if masks[warp, _CUT] >> lane & 1:
+                clip_and_store(scratch, positions, view, out, t, record, t, triangles)
+            else:
+                store_whole(screen, positions, triangles, t, record, view, out)
+            record += 1
 
 
 @kernel
-def _setup_several(several: Any, positions: Any, triangles: Any, view: View, out: Setup) -> None:
+def _store_part(
+    part: int,
+    parts: int,
+    records: Any,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    out: Setup,
+    masks: Any,
+) -> None:
+    """Take a share of the blocks, through arrays without reference counts."""
+    begin, end = _share(part, parts, out.subtriangles.size)
+    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
+    scratch = new_scratch()
+    _store_range(begin, end, records[part], screen, positions, triangles, view, out, borrow(masks), borrow(scratch))
+    scratch.steps[0] = 0  # the owner lives to here
+
+
+@kernel(lent=True)
+def _share(part: int, parts: int, triangles: int) -> Any:
+    """First triangle, and that behind the last, of a share of the blocks."""
+    blocks = (triangles + BLOCK - 1) // BLOCK
+    return blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles)
+
+
+@kernel
+def _store_several(several: Any, records: int, positions: Any, triangles: Any, view: View, out: Setup) -> None:
     """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
     scratch = new_scratch()
     for t in several:
         first = np.int64(out.misc[t])
-        clip_and_store(scratch, positions, view, out, first, first, t, triangles)
+        clip_and_store(scratch, positions, view, out, first, first + records, t, triangles)
 
 
 def as_published(switch: bool | None, release: Release) -> bool:
@@ -164,8 +212,8 @@ def make_view(
     )
 
 
-def check_mesh(positions: NDArray[Any], triangles: NDArray[Any], *, release: Release) -> None:
-    """Refuse arrays of other shapes and types, and indices that the release would not survive."""
+def check_mesh(positions: NDArray[Any], triangles: NDArray[Any], *, release: Release) -> tuple[int, int]:
+    """Refuse arrays of other shapes and types, and indices that the release would not survive; the first and last."""
     if positions.ndim != 2 or positions.shape[1] != 4 or positions.dtype != np.float32:
         raise TilestampError(
             f"positions are {positions.dtype} {positions.shape}; float32 (V, 4) in clip space is needed"
@@ -174,9 +222,11 @@ def check_mesh(positions: NDArray[Any], triangles: NDArray[Any], *, release: Rel
         raise TilestampError(f"triangles are {triangles.dtype} {triangles.shape}; int32 (F, 3) is needed")
     if len(triangles) > MAX_SUBTRIANGLES:
         raise TilestampError(f"{len(triangles)} triangles: cudaraster takes at most {MAX_SUBTRIANGLES} a draw")
-    if release == "1.1" and len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
+    first, last = (int(triangles.min()), int(triangles.max())) if len(triangles) else (0, -1)
+    if release == "1.1" and (first < 0 or last >= len(positions)):
         bad = int(np.flatnonzero(((triangles < 0) | (triangles >= len(positions))).any(axis=1))[0])
         raise TilestampError(f"triangle {bad} has a vertex index out of range; the mesh has {len(positions)} vertices")
+    return first, last
 
 
 def triangle_setup(
@@ -246,25 +296,35 @@ def triangle_setup(
         interpolate=interpolate,
         guard_band=guard_band,
     )
-    check_mesh(positions, triangles, release=release)
+    used = check_mesh(positions, triangles, release=release)
     F = len(triangles)
-    out = _empty_setup(F, F, release)
+    words = 16 if release == "1.1" else 4
+    out = _new_setup(np.empty(F, np.uint8), 0, 0, words)
     table = np.zeros((-(-F // BLOCK) if counting else 0, len(TriangleSetupEvent)), np.int64)
+    masks = np.empty((-(-F // WARP), 2), np.uint32)
     with np.errstate(all="ignore"):
-        screen = screen_vertices(positions, triangles, view)
         parts = parts_of(-(-F // BLOCK), _PART_BLOCKS)
         vertices = np.zeros((parts, 2), np.int64)
-        for_parts(
-            _setup_part, parts, screen, positions, triangles, view, simt, out, vertices, table if counting else None
+        given = (
+            screen_vertices(positions, used, view),
+            np.ascontiguousarray(positions).ravel(),
+            np.ascontiguousarray(triangles).ravel(),
+        )
+        plain = used[0] >= 0 and used[1] < len(positions)
+        single = for_parts(
+            _outcome_part, parts, *given, plain, view, simt, out, masks, vertices, table if counting else None
         )
         several = np.flatnonzero(out.subtriangles >= 2)
         counts = out.subtriangles[several].astype(np.int64)
         needed = F + int(counts.sum())
         capacity = F + SLACK if capacity is None else capacity
-        if len(several) and needed <= capacity:
-            out = _grown(out, needed)
-            out.misc[several] = F + np.cumsum(counts) - counts
-            _setup_several(several, positions, triangles, view, out)
+        if needed > capacity:
+            several, counts = several[:0], counts[:0]
+        records = np.cumsum([0, *single])
+        out = _new_setup(out.subtriangles, F + int(counts.sum()), int(records[-1] + counts.sum()), words)
+        for_parts(_store_part, parts, records, *given, view, out, masks)
+        out.misc[several] = F + np.cumsum(counts) - counts
+        _store_several(several, records[-1] - F, *given[1:], view, out)
     facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
     if not counting:
         return StageResult(out, (), facts)
@@ -282,18 +342,13 @@ def triangle_setup(
     return StageResult(out, (work,), facts)
 
 
-def _empty_setup(F: int, slots: int, release: Release) -> Setup:
+def _new_setup(subtriangles: NDArray[np.uint8], slots: int, records: int, words: int) -> Setup:
+    """Room for sub-triangles, their records of so many words."""
     return Setup(
-        subtriangles=np.zeros(F, np.uint8),
-        headers=np.zeros((slots, 6), np.int16),
-        misc=np.zeros(slots, np.uint32),
-        records=np.zeros(slots, np.int32),
-        planes=np.zeros((slots, 16 if release == "1.1" else 4), np.uint32),
-        inputs=np.zeros(slots, np.int32),
+        subtriangles=subtriangles,
+        headers=np.empty((slots, 6), np.int16),
+        misc=np.empty(slots, np.uint32),
+        records=np.empty(slots, np.int32),
+        planes=np.empty((records, words), np.uint32),
+        inputs=np.empty(records, np.int32),
     )
-
-
-def _grown(setup: Setup, slots: int) -> Setup:
-    """Make room for more slots."""
-    longer = [np.concatenate([a, np.zeros((slots - len(a), *a.shape[1:]), a.dtype)]) for a in setup[1:]]
-    return Setup(setup.subtriangles, *longer)

@@ -66,7 +66,17 @@ class TriangleSetupEvent(IntEnum):
 
 _E = TriangleSetupEvent
 _KEPT, _FAN, _STEPS = 0, 1, 2  # columns of ``Counting.most``: sub-triangles, fan, vertices walked at each of six planes
-_SEEN = 512  # places of a table of what a block has read: more than the 192 vertices that it can ask for
+_CORNERS = 192  # that a block loads, in six loads
+_SEEN = 512  # places of a table of what a block has read, more than those
+_EIGHTS = 24  # first bit of the second half of what is noted of a line
+
+
+class Lines(NamedTuple):
+    """Lines of 8 vertices that a block has read: a table by the last bits of their numbers."""
+
+    keys: NDArray[np.int64]  # (512,) which line; -1: none
+    loads: NDArray[np.int64]  # (512,) four bits a load: its sectors read; and above those: which eights of lanes did
+    used: NDArray[np.int64]  # (193,) how many places are taken, and which
 
 
 class Counting(NamedTuple):
@@ -75,8 +85,7 @@ class Counting(NamedTuple):
     lanes: NDArray[np.int64]  # (11,) lanes of the warp, a bit each, by outcome, site, and sub-triangles written
     most: NDArray[np.int64]  # (8,) of the clipped lanes of the warp, the longest
     total: NDArray[np.int64]  # (8,) and their sum
-    sectors: NDArray[np.int64]  # (512, 2) sectors of vertices that the block has read, and which loads of it did
-    lines: NDArray[np.int64]  # (512, 2) and lines
+    lines: Lines
 
 
 @kernel
@@ -84,9 +93,18 @@ def new_counting() -> Any:
     """Allocate what one worker counts with."""
     i64 = np.int64
     return Counting(
-        np.zeros(ABSENT + 6, i64), np.zeros(8, i64), np.zeros(8, i64), np.zeros((_SEEN, 2), i64),
-        np.zeros((_SEEN, 2), i64),
+        np.zeros(ABSENT + 6, i64), np.zeros(8, i64), np.zeros(8, i64),
+        Lines(np.full(_SEEN, -1, i64), np.zeros(_SEEN, i64), np.zeros(_CORNERS + 1, i64)),
     )  # fmt: skip
+
+
+@kernel(lent=True)
+def forget_warp(counting: Counting) -> None:
+    """Make ready for the next warp."""
+    if counting.lanes[CLIPPED]:
+        counting.most[:] = 0
+        counting.total[:] = 0
+    counting.lanes[:] = 0
 
 
 @kernel(lent=True)
@@ -117,47 +135,58 @@ def _groups(mask: Any, size: int) -> Any:
 
 
 @kernel(lent=True)
-def _note(seen: Any, mark: int, key: int, load: int) -> Any:
-    """Note that a load touches a segment; returns the loads of the block that had touched it before, a bit each."""
-    at, wanted = key & (_SEEN - 1), mark << 32 | key
-    while seen[at, 0] != wanted:
-        if seen[at, 0] >> 32 != mark:  # free: what stands here is an earlier block's
-            seen[at, 0], seen[at, 1] = wanted, 0
+def _place(lines: Lines, line: int) -> Any:
+    """Place of a line of vertices in the table of what a block has read."""
+    at = line & (_SEEN - 1)
+    while lines.keys[at] != line:
+        if lines.keys[at] < 0:
+            lines.keys[at], lines.loads[at] = line, 0
+            lines.used[0] += 1
+            lines.used[lines.used[0]] = at
             break
         at = (at + 1) & (_SEEN - 1)
-    before = seen[at, 1]
-    seen[at, 1] = before | load
-    return before
+    return at
 
 
 @kernel(lent=True)
-def count_vertices(
-    row: Any, vertices: Any, counting: Counting, triangles: Any, t0: int, n: int, block: int, simt: Simt
-) -> None:
-    """Count the loads of a warp's vertices, a corner of each triangle at a time, 16 bytes a lane.
+def note_vertices(lines: Lines, corners: Any, n: int, second: int, absent: int) -> None:
+    """Note which vertices the n lanes of a warp load, 16 bytes a lane, a corner of each triangle at a time.
+
+    ``second``: whether it is the second warp of its block. A line has four sectors of two vertices.
+    """
+    for corner in range(3):
+        load, at, bits = 4 * (3 * second + corner), 0, 0
+        last: Any = -1
+        for lane in range(n):
+            vertex: Any = np.int64(corners[np.uint64(3 * lane + corner)])
+            if absent >> lane & 1:
+                continue
+            if vertex >> 3 != last:
+                lines.loads[at] |= bits
+                last, bits = vertex >> 3, 0
+                at = _place(lines, last)
+            bits |= 1 << (load + (vertex >> 1 & 3)) | 1 << (_EIGHTS + load + (lane >> 3))
+        lines.loads[at] |= bits
+
+
+@kernel(lent=True)
+def count_vertices(row: Any, vertices: Any, lines: Lines, simt: Simt) -> None:
+    """Count the loads of a block's vertices, and forget them.
 
     ``vertices`` adds up what the streams say: sectors, each once a block, and lines, each once a load.
     """
     segment = smallest_transaction_bytes(simt.coalescing)
     eights, count = segment != SECTOR_BYTES, 0  # lines are loaded by eight lanes at a time
-    for corner in range(3):
-        first = 1 << (12 * (t0 // WARP % 2) + 4 * corner)  # bit of the warp's first eight lanes
-        whole = 15 * first
-        last: Any = -1
-        before: Any = -1
-        for lane in range(n):
-            load = first << (lane >> 3)
-            if lane & 7 == 0:
-                last = before = -1
-            sector = np.int64(triangles[t0 + lane, corner]) * POSITION_BYTES // SECTOR_BYTES
-            if sector in (last, before) or counting.lanes[ABSENT] >> lane & 1:
-                continue  # most vertices are those of a neighbour
-            before, last = last, sector
-            earlier = _note(counting.sectors, block + 1, sector, load)
-            vertices[0] += earlier == 0
-            lines = _note(counting.lines, block + 1, sector >> 2, load)
-            vertices[1] += lines & whole == 0
-            count += lines & load == 0 if eights else earlier & whole == 0
+    for i in range(1, lines.used[0] + 1):
+        at = lines.used[i]
+        lines.keys[at] = -1
+        sectors = lines.loads[at] & (1 << _EIGHTS) - 1
+        once = sectors | sectors >> 12
+        vertices[0] += _lanes((once | once >> 4 | once >> 8) & 0xF)
+        halves = sectors | sectors >> 1
+        vertices[1] += _lanes((halves | halves >> 2) & 0x111111)
+        count += _lanes(lines.loads[at] >> _EIGHTS if eights else sectors)
+    lines.used[0] = 0
     row[_E.LOAD_TRANSACTIONS] += count
     row[_E.LOAD_BYTES] += count * segment
 
@@ -210,7 +239,7 @@ def _count_lanes(row: Any, counting: Counting, n: int) -> None:
 
 @kernel(lent=True)
 def count_warp(row: Any, counting: Counting, n: int, view: View, out: Setup, simt: Simt) -> None:
-    """Count a warp of n triangles, its vertices apart, and forget its lanes.
+    """Count a warp of n triangles, its vertices apart.
 
     Indices and counts stand side by side; a header has 16 bytes, a record as many, or in 1.1 four times as many, of
     which the first part is written for depth alone, the middle two for interpolation alone.
@@ -228,7 +257,3 @@ def count_warp(row: Any, counting: Counting, n: int, view: View, out: Setup, sim
     stores += parts * _groups(single, max(segment // (4 * out.planes.shape[1]), 1))
     row[_E.STORE_TRANSACTIONS] += stores
     row[_E.STORE_BYTES] += stores * segment
-    if lanes[CLIPPED]:
-        counting.most[:] = 0
-        counting.total[:] = 0
-    lanes[:] = 0
