@@ -15,6 +15,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 from tilestamp.models.compile_cache import compiling
+from tilestamp.models.compile_quicker import quicker
 from tilestamp.models.kernel_cache import KernelCache
 from tilestamp.models.kernel_library import for_kernels, gathers, nested, outermost
 
@@ -94,5 +95,5 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
             known = self.overloads.get(types_given)
             if known is not None and for_kernels(known.library):
                 del self.overloads[types_given]
-            with outermost(self.targetctx.codegen()):
+            with quicker(), outermost(self.targetctx.codegen()):
                 return super().compile(sig)

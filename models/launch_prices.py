@@ -85,7 +85,10 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
             load_units(units, sm, own, alone)
             seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         terms = bound_terms(launch, whole, totals, machine, fact)
-        row[:TAIL] = terms
+        for column in range(
+            TAIL
+        ):  # Numba compiles row[:TAIL] = terms for a second: what it would say of unlike lengths
+            row[column] = terms[column]
         if scheduled:
             loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, fact)
             queue, pace = terms[Term.QUEUE] if launch.drawn else loaded.memory, loaded.pace

@@ -45,6 +45,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
 from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of
 from tilestamp.models.numbers import Number as M
+from tilestamp.models.partition import partitioned
 from tilestamp.models.turns import at_least, in_turn, rest_of
 
 EXCESS = 1.15  # times the largest term: from here on balance or tail is what holds
@@ -231,7 +232,7 @@ def _neighbours(units: Loads) -> float:
     most, work = units.own.max(), units.sm.sum()
     if work >= sms * (units.sm.max() + most):
         return most  # type: ignore[no-any-return]
-    return np.partition(units.sm, count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
+    return partitioned(units.sm, count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
 
 
 @kernel

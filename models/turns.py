@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
+from tilestamp.models.partition import partitioned
 
 KNEE = 2.5  # H200, experiments/silicon/measured/splat/blending.csv: equal blocks of a loop, 2 to 16 warps a scheduler
 
@@ -37,7 +38,7 @@ def rest_of(sm: Any, places: int, sms: int) -> Any:
     no longer than the others: they have an SM to themselves.
     """
     count = len(sm)
-    longest = np.partition(sm, count - sms - 1)[count - sms - 1] if count > sms else 0.0
+    longest = partitioned(sm, count - sms - 1)[count - sms - 1] if count > sms else 0.0
     behind, found = 0.0, np.empty(count)
     for i in range(count - 1, -1, -1):
         found[i] = behind
