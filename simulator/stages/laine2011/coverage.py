@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.exact import tile_bits
+from tilestamp.simulator.stages.laine2011.lanes import tile_bits
 
 TILE = 8  # pixels
 _FAR = 1 << 30
