@@ -14,7 +14,7 @@ LANES = 8
 _LOW = 0xFFFFFFFF
 
 
-def _spread(builder: Any, value: Any, vector: Any) -> Any:
+def spread(builder: Any, value: Any, vector: Any) -> Any:
     """Take a number, an integer's low bits where it is too wide, to all lanes of a vector."""
     from llvmlite import ir
 
@@ -25,57 +25,18 @@ def _spread(builder: Any, value: Any, vector: Any) -> Any:
     return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(index, vector.count), [0] * vector.count))
 
 
-def _vectors(context: Any, builder: Any, kind: Any, array: Any, at: Any, vector: Any) -> Any:
+def from_lane(builder: Any, vector: Any, lane: int, wide: Any) -> Any:
+    """Take one lane of a vector to all lanes of another."""
+    from llvmlite import ir
+
+    lanes = ir.Constant(ir.VectorType(ir.IntType(32), wide.count), [lane] * wide.count)
+    return builder.shuffle_vector(vector, vector, lanes)
+
+
+def vectors(context: Any, builder: Any, kind: Any, array: Any, at: Any, vector: Any) -> Any:
     """Point to vectors in an array, from its element ``at`` on."""
     data = context.make_array(kind)(context, builder, value=array).data
     return builder.bitcast(data if at is None else builder.gep(data, [at]), vector.as_pointer())
-
-
-def tile_bits(a: Any, b: Any, c: Any) -> Any:
-    """Pixels of a tile of 8 x 8 at which none of three edge functions is negative, as a uint64.
-
-    Parameters
-    ----------
-    a, b, c : tuple of int
-        Of each edge: its value at the lower left pixel, what a step right takes from it, and what a step up adds. All
-        sums are within int32.
-
-    Returns
-    -------
-    uint64
-        Pixel (x, y) at bit 8 * y + 7 - x.
-    """
-    edges = [tuple(map(int, edge)) for edge in (a, b, c)]
-    pixels = [(x, y) for y in range(8) for x in reversed(range(8))]
-    inside = [all(start - right * x + up * y >= 0 for start, right, up in edges) for x, y in pixels]
-    return np.uint64(sum(1 << i for i, is_inside in enumerate(inside) if is_inside))
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _llvm_tile_bits(_context: Any, a: Any, b: Any, c: Any) -> Any:
-    from llvmlite import ir
-
-    row = ir.VectorType(ir.IntType(32), 8)
-
-    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        columns, word = ir.Constant(row, list(reversed(range(8)))), ir.IntType(64)
-        edges = [[_spread(builder, builder.extract_value(edge, i), row) for i in range(3)] for edge in args]
-        values = [builder.sub(start, builder.mul(right, columns)) for start, right, _ in edges]
-        bits = ir.Constant(word, 0)
-        for y in range(8):
-            signs = builder.or_(builder.or_(values[0], values[1]), values[2])
-            inside = builder.icmp_signed(">=", signs, ir.Constant(row, [0] * 8))
-            eight = builder.zext(builder.bitcast(inside, ir.IntType(8)), word)
-            bits = builder.or_(bits, builder.shl(eight, ir.Constant(word, 8 * y)))
-            values = [builder.add(value, up) for value, (_, _, up) in zip(values, edges, strict=True)]
-        return bits
-
-    return types.uint64(a, b, c), codegen
-
-
-@overload(tile_bits)
-def _tile_bits(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
-    return lambda a, b, c: _llvm_tile_bits(a, b, c)  # noqa: PLW0108 - numba needs a function
 
 
 def mixed(colors: Any, corners: Any, weights: Any) -> Any:
@@ -108,11 +69,11 @@ def _llvm_mixed(_context: Any, colors: Any, corners: Any, weights: Any) -> Any:
     whole, byte, word = ir.IntType(32), ir.VectorType(ir.IntType(8), 4), ir.IntType(64)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        rows = _vectors(context, builder, signature.args[0], args[0], None, single)
+        rows = vectors(context, builder, signature.args[0], args[0], None, single)
         parts = []
         for i in range(3):
             color = builder.load(builder.gep(rows, [builder.extract_value(args[1], i)]), align=4)
-            parts.append(builder.fmul(_spread(builder, builder.extract_value(args[2], i), single), color))
+            parts.append(builder.fmul(spread(builder, builder.extract_value(args[2], i), single), color))
         value = builder.fpext(builder.fadd(builder.fadd(parts[0], parts[1]), parts[2]), double)
         zero, most = ir.Constant(double, [0.0] * 4), ir.Constant(double, [255.0] * 4)
         scaled = builder.fadd(builder.fmul(value, most), ir.Constant(double, [0.5] * 4))
@@ -153,8 +114,8 @@ def write(first: Any, step: Any, values: Any, at: Any, bits: Any) -> None:
 def _ramp(builder: Any, first: Any, step: Any, row: Any) -> Any:
     from llvmlite import ir
 
-    steps = builder.mul(_spread(builder, step, row), ir.Constant(row, list(range(LANES))))
-    return builder.add(_spread(builder, first, row), steps)
+    steps = builder.mul(spread(builder, step, row), ir.Constant(row, list(range(LANES))))
+    return builder.add(spread(builder, first, row), steps)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -164,9 +125,9 @@ def _llvm_below(_context: Any, first: Any, step: Any, values: Any, at: Any, or_e
     row, flag = ir.VectorType(ir.IntType(32), LANES), ir.VectorType(ir.IntType(1), LANES)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        held = builder.load(_vectors(context, builder, signature.args[2], args[2], args[3], row), align=4)
+        held = builder.load(vectors(context, builder, signature.args[2], args[2], args[3], row), align=4)
         ramp = _ramp(builder, args[0], args[1], row)
-        same = builder.and_(builder.icmp_unsigned("==", ramp, held), _spread(builder, args[4], flag))
+        same = builder.and_(builder.icmp_unsigned("==", ramp, held), spread(builder, args[4], flag))
         found = builder.or_(builder.icmp_unsigned("<", ramp, held), same)
         return builder.zext(builder.bitcast(found, ir.IntType(LANES)), ir.IntType(64))
 
@@ -180,7 +141,7 @@ def _llvm_write(_context: Any, first: Any, step: Any, values: Any, at: Any, bits
     row, flag = ir.VectorType(ir.IntType(32), LANES), ir.VectorType(ir.IntType(1), LANES)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        place = _vectors(context, builder, signature.args[2], args[2], args[3], row)
+        place = vectors(context, builder, signature.args[2], args[2], args[3], row)
         mask = builder.bitcast(builder.trunc(args[4], ir.IntType(LANES)), flag)
         chosen = builder.select(mask, _ramp(builder, args[0], args[1], row), builder.load(place, align=4))
         builder.store(chosen, place, align=4)
