@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
-from tilestamp.simulator.pipelines import _ru as ru
+from tilestamp.simulator.pipelines._ru import REMARKS as RU_REMARKS
+from tilestamp.simulator.pipelines._ru import RuOptions, input_ids, shade_fragments, shade_vertices
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
@@ -34,7 +35,7 @@ REMARKS = {
 }
 
 
-class PerPrimitiveOptions(ru.RuOptions, frozen=True, kw_only=True):
+class PerPrimitiveOptions(RuOptions, frozen=True, kw_only=True):
     """Options of the pipeline per-primitive."""
 
     maps: ClassVar[dict[str, str]] = {"race": "pixels that unprotected writes leave wrong", RACED: "the same"}
@@ -47,16 +48,16 @@ def per_primitive(
     execute: Executor,
 ) -> Frame:  # fmt: skip
     """Textured triangles by one thread each, with its write race (Ru 2016)."""
-    model = ru.shade_vertices(scene, matrix, width, height, simt, options, execute)
+    model = shade_vertices(scene, matrix, width, height, simt, options, execute)
     execute(clear, width, height, 0, simt)
     meant, raced = execute(
         per_primitive_raster, model.vertices.screen, model.mesh.triangles, model.drawable, width, height, simt,
         culling=options.cull_backfaces, textured=model.mesh.texture_ids >= 0, samples=options.samples,
     ).outputs  # fmt: skip
     visible = Visible(raced.triangles, meant.depth) if options.race else meant
-    image = ru.shade_fragments(scene, matrix, model, visible, simt, options, execute)
+    image = shade_fragments(scene, matrix, model, visible, simt, options, execute)
     wrong = (raced.triangles != meant.triangles).astype(np.int64)
     facts = {RACED: int(wrong.sum()), "pixels drawn": int((meant.triangles >= 0).sum()), **model.facts}
-    said = remarks(ru.REMARKS, facts) + (remarks(REMARKS, facts) if options.race else ())
-    ids = ru.input_ids(model, visible)
+    said = remarks(RU_REMARKS, facts) + (remarks(REMARKS, facts) if options.race else ())
+    ids = input_ids(model, visible)
     return Frame(image, meant.depth, execute.works, ids, {"race": wrong, RACED: wrong}, facts, said)

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
-from tilestamp.simulator.pipelines import _ru as ru
+from tilestamp.simulator.pipelines._ru import REMARKS as RU_REMARKS
+from tilestamp.simulator.pipelines._ru import RuOptions, input_ids, shade_fragments, shade_vertices
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
@@ -31,13 +32,13 @@ from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, ras
 from tilestamp.simulator.work import Work
 
 LOST = "list entries lost by overflow"
-REMARKS = ru.REMARKS | {
+REMARKS = RU_REMARKS | {
     LOST: "{:,} list entries, beside {list entries:,} others, found no room and are not drawn, where the original "
     "would have written into the next list: capacity=safe has room for all"
 }
 
 
-class TiledOptions(ru.RuOptions, frozen=True, kw_only=True):
+class TiledOptions(RuOptions, frozen=True, kw_only=True):
     """Options of the pipeline tiled."""
 
     maps: ClassVar[dict[str, str]] = {
@@ -61,7 +62,7 @@ def tiled(
 ) -> Frame:
     """Textured triangles by tile lists, a thread a pixel (Ru 2016)."""
     tile = options.tile
-    model = ru.shade_vertices(scene, matrix, width, height, simt, options, execute)
+    model = shade_vertices(scene, matrix, width, height, simt, options, execute)
     execute(clear, width, height, -(-width // tile) * -(-height // tile), simt)
     lists, _, listed = execute(
         tile_lists, model.vertices.screen, model.mesh.triangles, model.drawable, width, height, simt,
@@ -71,14 +72,14 @@ def tiled(
         tiled_raster, model.vertices.screen, model.mesh.triangles, lists, width, height, simt,
         tile=tile, gaps=not options.ssao,
     )  # fmt: skip
-    image = ru.shade_fragments(scene, matrix, model, visible, simt, options, execute)
+    image = shade_fragments(scene, matrix, model, visible, simt, options, execute)
     sizes = np.diff(lists.starts)
     facts = {
         "tile": tile, "list entries": int(sizes.sum()), "longest list": int(sizes.max()), LOST: listed["lost"],
         **model.facts,
     }  # fmt: skip
     return Frame(
-        image, visible.depth, execute.works, ru.input_ids(model, visible), _maps(sizes, raster, -(-height // tile)),
+        image, visible.depth, execute.works, input_ids(model, visible), _maps(sizes, raster, -(-height // tile)),
         facts, remarks(REMARKS, facts), tile,
     )  # fmt: skip
 
