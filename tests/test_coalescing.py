@@ -134,3 +134,30 @@ def test_runs_of_lanes_at_one_address_need_what_their_lanes_need(runs, rising, s
     at_starts = np.array([a if starts >> i & 1 else -7 for i, a in enumerate(addresses)], np.int64)
     found = transactions_of_runs(at_starts, np.uint64(starts), len(lanes), size, rule)
     assert found == transactions(addresses, len(lanes), size, rule)
+
+
+def halved(lanes, size):
+    """Bytes of the transactions of a half-warp of 1.2 and 1.3, by the programming guide's words."""
+    segment = min(128, 32 * size)
+    for base in sorted({address // segment for address in lanes}):
+        inside = [address for address in lanes if address // segment == base]
+        low, high, bytes_ = base * segment, base * segment + segment, segment
+        while bytes_ > 32:
+            middle = low + bytes_ // 2
+            if max(inside) + size <= middle:
+                high = middle
+            elif min(inside) >= middle:
+                low = middle
+            else:
+                break
+            bytes_ = high - low
+        yield bytes_
+
+
+@given(st.lists(st.integers(0, 400), min_size=1, max_size=16), st.sampled_from([1, 2, 4, 8, 16]))
+@settings(max_examples=200, derandomize=True, deadline=None)
+def test_a_half_warp_of_any_addresses_takes_the_segments_of_the_programming_guide(lanes, size):
+    segment = min(128, 32 * size)
+    lanes = [address for address in lanes if address % segment + size <= segment]  # unaligned, yet in one segment
+    expected = list(halved(lanes, size))
+    assert transactions(np.array(lanes, np.int64), len(lanes), size, SEGMENTS) == (len(expected), sum(expected))
