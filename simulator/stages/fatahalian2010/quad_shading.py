@@ -119,12 +119,11 @@ def quad_shading(
         Stream("colors", "store", colors, min(colors, COLOR_BYTES * len(shaded.seen))),
     )
     work = Work(
-        stage="quad_shading",
-        kernel="quad_shading",
-        events=QuadEvent,
-        table=table,
+        "quad_shading",
+        QuadEvent,
+        table,
+        WARPS * simt.warp,
         grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
         shared_bytes=WARPS * ENTRY_BYTES * entries,
         dispatch="warp_queue",
         streams=streams,

@@ -125,12 +125,11 @@ def decoupled_shading(
         Stream("colors", "store", colors, min(colors, COLOR_BYTES * count_)),
     )
     work = Work(
-        stage="decoupled_shading",
-        kernel="decoupled_shading",
-        events=DecoupledEvent,
-        table=table,
+        "decoupled_shading",
+        DecoupledEvent,
+        table,
+        WARPS * simt.warp,
         grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
         shared_bytes=WARPS * CELL_BYTES * shading.cache,
         dispatch="warp_queue",
         streams=streams,

@@ -109,12 +109,11 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     )
     grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
     work = Work(
-        stage="bit_mask",
-        kernel="bit_mask",
-        events=BitMaskEvent,
-        table=table,
+        "bit_mask",
+        BitMaskEvent,
+        table,
+        block,
         grid=grid,
-        block=block,
         shared_bytes=shared,
         dispatch="warp_queue",
         streams=streams,
