@@ -1,6 +1,6 @@
 """What a stage did: a work table, a row a unit of work, a column an event of its own; or items of a fixed pipe."""
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import IntEnum
 from typing import Literal
 
@@ -10,23 +10,29 @@ from numpy.typing import NDArray
 from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
 
+A_UNIT = -1  # of a grid: a block for each unit
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, eq=False)
 class Work:
     """What one kernel of a stage did.
 
     Parameters
     ----------
-    stage, kernel : str
-        The paper's word for the stage, and the kernel's name inside it.
+    stage : str
+        The paper's word for it.
     events : type of IntEnum
         The stage's own events: the columns of ``table``. An event that bears the name of a ``MachineEvent``
         (LOAD_TRANSACTIONS, ATOMIC_REQUESTS, BANK_REPLAYS, ...) passes through the mix as it is. What reports show of
         them is declared beside them (``tilestamp.models.counters``).
     table : ndarray, (units, len(events)), int64
         Row i is unit i: a block of the grid, or the item that a persistent block or warp drew from its queue.
-    grid, block : int
-        Blocks, and threads in a block.
+    block : int
+        Threads in a block.
+    kernel : str
+        The kernel's name inside the stage; the stage's own if not given.
+    grid : int
+        Blocks; one a unit if not given.
     shared_bytes : int
         Shared memory a block, where the stage fixes it (a mix may add its own).
     dispatch : {"blocks", "block_queue", "warp_queue"}
@@ -42,17 +48,22 @@ class Work:
     """
 
     stage: str
-    kernel: str
     events: type[IntEnum]
     table: NDArray[np.int64]
-    grid: int
     block: int
+    _: KW_ONLY
+    kernel: str = ""
+    grid: int = A_UNIT
     shared_bytes: int = 0
     dispatch: Literal["blocks", "block_queue", "warp_queue"] = "blocks"
     streams: tuple[Stream, ...] = ()
     atomic_requests: NDArray[np.int64] | None = field(default=None, repr=False)
     variant: str = ""
     grid_by_sms: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kernel", self.kernel or self.stage)
+        object.__setattr__(self, "grid", len(self.table) if self.grid == A_UNIT else self.grid)
 
     @property
     def persistent(self) -> bool:

@@ -4,8 +4,15 @@ import numpy as np
 
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
+from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
-from tilestamp.models.traffic import traffic
+from tilestamp.models.traffic import Traffic, traffic
+
+GTX280 = altered(  # blocks start at once, round rates
+    load_machine("gtx280"), {"launch.blocks_per_us": 400.0, "fixed_function.per_clock.primitives": 1.0}
+)
+H200 = load_machine("h200")
+NOTHING = Traffic(0.0, 0.0, 1.0)
 
 
 def launch_of(units, block=64, *, grid=None, shared_bytes=0, dispatch="blocks", streams=(), requests=None, **events):

@@ -5,22 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from tests.pricing import bounds, launch_of
+from tests.pricing import GTX280, H200, NOTHING, bounds, launch_of
 from tilestamp.models.demand import demand
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import PipeLaunch, Stream
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.price import price
 from tilestamp.models.traffic import Traffic, traffic
-
-GTX280 = altered(
-    load_machine("gtx280"),
-    {"launch.blocks_per_us": 400.0, "fixed_function.per_clock.primitives": 1.0},  # blocks start at once, round rates
-    "assumed",
-    "a test",
-)
-H200 = load_machine("h200")
-NOTHING = Traffic(0.0, 0.0, 1.0)
 
 
 def launch(units=3000, block=64, **described):

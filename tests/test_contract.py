@@ -119,20 +119,20 @@ def test_a_machine_of_twice_the_clock_halves_a_launch_that_is_bound_by_issue():
     slow = simulate("teapot", "micropolygon", "gtx280", width=320, height=240)
     raster = slow.stages.loc["tile_raster"]
     machine = load_machine("gtx280")
-    fast = slow.on(altered(machine, {"sm.clock_mhz": 2 * machine.sm.clock_mhz}, "assumed", "a test"))
+    fast = slow.on(altered(machine, {"sm.clock_mhz": 2 * machine.sm.clock_mhz}))
     assert fast.stages.loc["tile_raster", "issue_ms"] == pytest.approx(raster["issue_ms"] / 2)
 
 
 def test_a_run_is_not_priced_on_a_machine_that_counts_otherwise():
     run = draw("freepipe")
     with pytest.raises(TilestampError, match=r"not counted for h200 .*\(bank_lanes 32 and 16\): simulate again on it"):
-        run.on(altered(run.machine, {"memory.bank_lanes": 16}, "assumed", "a test"))
+        run.on(altered(run.machine, {"memory.bank_lanes": 16}))
     with pytest.raises(TilestampError, match="coalescing 3 and 1"):
         run.on("gtx280")
 
 
 def test_a_run_whose_kernels_launch_a_block_an_sm_is_not_priced_for_other_sms():
-    fewer = altered(load_machine("h200"), {"sm.count": 100}, "assumed", "a test")
+    fewer = altered(load_machine("h200"), {"sm.count": 100})
     assert draw("freepipe").on(fewer).milliseconds > 0
     with pytest.raises(TilestampError, match="sms 132 and 100"):
         draw("cudaraster").on(fewer)

@@ -39,7 +39,7 @@ class SilentEvent(IntEnum):
 
 def luck(*rows, events=LuckEvent, stage="luck"):
     table = np.array(rows, np.int64).reshape(-1, len(events))
-    return Work(stage=stage, kernel="draw", events=events, table=table, grid=len(table), block=64)
+    return Work(stage, events, table, 64, kernel="draw")
 
 
 MIX = """

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import bounds, schedule
-from tests.test_schedule import NOTHING, launch, work_cycles
+from tests.pricing import NOTHING, bounds, schedule
+from tests.pricing import launch_of as launch
+from tests.test_schedule import work_cycles
 from tests.test_time_properties import MACHINES, launches
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.events import MachineEvent
@@ -42,7 +43,7 @@ def freed(what, machine, term, moved=NOTHING):
 @pytest.mark.parametrize("term", CAUSES)
 @pytest.mark.parametrize("dispatch", ["blocks", "warp_queue"])
 def test_free_of_a_term_a_launch_takes_as_long_as_without_its_events(term, dispatch):
-    machine = altered(GTX480, {"latency.block_launch_cycles": 0.0}, "assumed", "a test")
+    machine = altered(GTX480, {"latency.block_launch_cycles": 0.0})
     rng = np.random.default_rng(1)
     what = launch(700, dispatch=dispatch, grid=60, **{name: n * rng.random(700) for name, n in EVENTS.items()})
     what = replace(what, atomic_requests=np.full(40, 30000))
@@ -63,10 +64,10 @@ def test_free_of_a_bandwidth_a_launch_takes_as_long_as_without_its_bytes(term, l
 
 
 def test_free_of_launch_and_of_start_only_those_are_gone():
-    what, slow = launch(6000, FP32=10), altered(H200, {"launch.blocks_per_us": 1.0}, "assumed", "a test")
+    what, slow = launch(6000, FP32=10), altered(H200, {"launch.blocks_per_us": 1.0})
     now = schedule(what, slow, NOTHING)
     assert freed(what, slow, "launch").cycles == pytest.approx(now.cycles - now.term_cycles["launch"])
-    fast = altered(H200, {"launch.blocks_per_us": 1e6}, "assumed", "a test")
+    fast = altered(H200, {"launch.blocks_per_us": 1e6})
     assert freed(what, slow, "start").cycles == pytest.approx(schedule(what, fast, NOTHING).cycles, rel=1e-2)
 
 

@@ -156,7 +156,7 @@ def test_draws_at_one_counter_come_one_after_another_and_the_last_item_then_runs
 
 def test_an_sm_sends_its_atomics_at_its_own_rate_however_many_sms_there_are():
     what = launch_of(1, 256, ATOMIC_REQUESTS=10**5)
-    times = [microseconds(what, altered(H200, {"sm.count": sms}, "assumed", "a test")) for sms in (66, 132, 264, 528)]
+    times = [microseconds(what, altered(H200, {"sm.count": sms})) for sms in (66, 132, 264, 528)]
     assert times == pytest.approx([times[0]] * 4)
     assert times[0] == pytest.approx(10**5 / 0.987 / 1970.7, rel=0.05)
 
@@ -174,7 +174,7 @@ def test_a_block_more_on_an_sm_never_makes_a_long_block_late():
     chains = np.full(264, 10.0)
     chains[0] = 10**4
     what = launch_of(264, 32, CHAIN_LOAD=chains, LOAD=2000)
-    one, many = (schedule(what, altered(AT_ONCE, {"sm.max_blocks": n}, "assumed", "a test"), NOTHING) for n in (1, 32))
+    one, many = (schedule(what, altered(AT_ONCE, {"sm.max_blocks": n}), NOTHING) for n in (1, 32))
     assert one.cycles == many.cycles == pytest.approx(OVERHEAD + START + 10**4 * DRAM)
 
 

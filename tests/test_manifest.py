@@ -108,9 +108,9 @@ def test_a_run_on_another_machine_says_so():
 
 def test_changed_and_changed_back_is_the_plain_machine():
     machine = load_machine("gtx280")
-    changed = altered(machine, {"sm.count": 60}, "assumed", "a test")
+    changed = altered(machine, {"sm.count": 60})
     assert changed.name == "gtx280 (sm.count=60)"
-    assert altered(changed, {"sm.count": 30}, "assumed", "a test").name == "gtx280"
+    assert altered(changed, {"sm.count": 30}).name == "gtx280"
     twice = altered(altered(changed, {"memory.banks": 32}, "assumed", ""), {"sm.count": 15}, "assumed", "")
     assert twice.name == "gtx280 (memory.banks=32, sm.count=15)"
     assert twice.changes["sm.count"] == (30, 15)

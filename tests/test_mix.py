@@ -65,7 +65,7 @@ def test_lanes_that_are_not_counted_are_refused():
 
 
 def test_a_kernel_without_a_mix_is_refused():
-    work = Work(stage="s", kernel="unknown", events=Event, table=np.zeros((1, 3), np.int64), grid=1, block=32)
+    work = Work("s", Event, np.zeros((1, 3), np.int64), 32, kernel="unknown", grid=1)
     with pytest.raises(TilestampError, match="unknown"):
         load_mix("micropolygon", "1.3").launch(work, 32)
 
@@ -73,7 +73,7 @@ def test_a_kernel_without_a_mix_is_refused():
 def test_a_launch_has_the_works_shape_and_the_mixs_prices():
     mix = Mix("p/cc1", {"k": KernelMix("k", 21, 100, {"STEPS": {"fp32": 3, "shared": 2}}, {}, in_step=True)}, "")
     table = np.array([[1, 32, 5], [2, 40, 7]], np.int64)
-    work = Work(stage="s", kernel="k", events=Event, table=table, grid=2, block=64, shared_bytes=16)
+    work = Work("s", Event, table, 64, kernel="k", grid=2, shared_bytes=16)
     launch = mix.launch(work, 32)
     assert (launch.registers, launch.shared_bytes, launch.grid, launch.block) == (21, 116, 2, 64)
     assert launch.in_step

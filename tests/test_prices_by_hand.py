@@ -57,7 +57,7 @@ ROUND = {  # 2 SMs at 1 GHz: a cycle is a nanosecond
     "launch.kernel_us": 2.0,
     "launch.blocks_per_us": 100.0,
 }
-MACHINE = altered(load_machine("h200"), ROUND, "assumed", "a test")
+MACHINE = altered(load_machine("h200"), ROUND)
 NOTHING = Traffic(0.0, 0.0, 0.0)
 
 
@@ -132,7 +132,7 @@ def test_a_warp_waits_for_others_of_its_block_on_its_scheduler():
 
 
 def test_loads_that_l1_holds_are_its_round_trips():
-    near = altered(MACHINE, {"latency.l1_cycles": 30.0}, "assumed", "a test")
+    near = altered(MACHINE, {"latency.l1_cycles": 30.0})
     moved = Traffic(0, 0, 0.5, from_l1=0.75)
     assert asked(moved, near, CHAIN_LOAD=1, dispatch="block_queue").chain == 0.75 * 30 + 0.25 * (100 + 500) / 2
 
@@ -153,7 +153,7 @@ def test_the_chip_serves_atomics_at_its_own_rate():
 
 
 def test_where_blind_atomics_are_no_faster_all_go_at_one_rate():
-    alike = altered(MACHINE, {"atomics.unawaited_per_clock": 0.0}, "assumed", "a test")
+    alike = altered(MACHINE, {"atomics.unawaited_per_clock": 0.0})
     assert terms(machine=alike, ATOMIC_REQUESTS=40)["atomic"] == 40 / 2
 
 
@@ -231,7 +231,7 @@ def test_persistent_blocks_start_once():
 
 def test_draws_from_a_queue_pass_its_atomic_unit_one_by_one():
     """Of two SMs with two items of 100 cycles each, the last is drawn when four requests of 300 cycles have passed."""
-    slow = altered(MACHINE, {"atomics.unit_ns_per_request": 300.0}, "assumed", "a test")
+    slow = altered(MACHINE, {"atomics.unit_ns_per_request": 300.0})
     what = launch(units=4, block=32, dispatch="block_queue", FP32=100, ATOMIC_REQUESTS=1, requests=np.array([4]))
     what = type(what)(**{**vars(what), "grid": 2})
     assert schedule(what, slow, NOTHING).cycles == pytest.approx(2000 + 40 + 4 * 300 + 100, abs=1)
@@ -259,7 +259,7 @@ def test_loads_fetch_what_no_earlier_launch_left():
 
 
 def test_a_small_cache_writes_back_what_it_drops():
-    small = altered(MACHINE, {"memory.l2_bytes": 1000}, "assumed", "a test")
+    small = altered(MACHINE, {"memory.l2_bytes": 1000})
     writes, reads = launch(streams=[stream("a", "store", 800)]), launch(streams=[stream("b", "load", 600)])
     first, second, third = traffic([writes, reads, reads], small)
     assert first.dram_bytes == 0
@@ -268,7 +268,7 @@ def test_a_small_cache_writes_back_what_it_drops():
 
 
 def test_a_store_larger_than_the_cache_goes_through():
-    small = altered(MACHINE, {"memory.l2_bytes": 1000}, "assumed", "a test")
+    small = altered(MACHINE, {"memory.l2_bytes": 1000})
     assert traffic([launch(streams=[stream("a", "store", 1500)])], small)[0].dram_bytes == 500
 
 
@@ -285,7 +285,7 @@ def test_an_l1_that_holds_loads_asks_once_an_sm():
 def test_the_slowest_unit_of_a_pipe_by_hand():
     pipe = {"fixed_function.clock_mhz": 500.0, "fixed_function.per_clock.primitives": 2.0}
     pipe |= {"fixed_function.per_clock.pixels": 10.0}
-    machine = altered(MACHINE, pipe, "assumed", "a test")
+    machine = altered(MACHINE, pipe)
     passed = PipeLaunch(stage="s", kernel="k", items={"primitives": 300, "pixels": 2000})
     timing = pipe_time(passed, machine, Traffic(5000.0, 0.0, 0.0))
     assert timing.term_cycles["primitives"] == 300 / 2 * 2  # two cycles of the SMs a clock of the pipe

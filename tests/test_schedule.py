@@ -7,21 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import bounds, schedule
+from tests.pricing import GTX280, H200, NOTHING, bounds, schedule
 from tests.pricing import launch_of as launch
 from tilestamp.models.events import EVENTS, MachineEvent
 from tilestamp.models.launch import Launch
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.models.traffic import Traffic
 
-GTX280 = altered(
-    load_machine("gtx280"),
-    {"launch.blocks_per_us": 400.0, "fixed_function.per_clock.primitives": 1.0},  # blocks start at once, round rates
-    "assumed",
-    "a test",
-)
-H200 = load_machine("h200")
-NOTHING = Traffic(0.0, 0.0, 1.0)
 COLUMNS = ("FP32", "SHARED", "CHAIN_LOAD", "LOAD_BYTES", "ATOMIC_REQUESTS")
 
 

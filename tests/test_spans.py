@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.pricing import schedule
-from tests.test_schedule import GTX280, H200, NOTHING, launch
+from tests.pricing import GTX280, H200, NOTHING, schedule
+from tests.pricing import launch_of as launch
 from tests.test_time_properties import MACHINES, launches
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Stream
@@ -97,7 +97,7 @@ def replace_issue(machine):
     """The machine with shared memory that is slower than its schedulers."""
     from tilestamp.models.machine import altered
 
-    return altered(machine, {"memory.bank_pass_cycles": 20.0}, "assumed", "a test")
+    return altered(machine, {"memory.bank_pass_cycles": 20.0})
 
 
 @pytest.mark.parametrize(("dispatch", "before"), [("blocks", 0.0), ("block_queue", H200.latency.block_launch_cycles)])

@@ -78,7 +78,7 @@ def better(machine, key):
     if key in ("sm.max_warps", "sm.max_threads_per_block"):
         changed["sm.max_threads"] = 2 * machine.sm.max_threads
     try:
-        return altered(machine, changed, "assumed", "a test")
+        return altered(machine, changed)
     except TilestampError:
         return None
 
@@ -107,7 +107,7 @@ def test_a_number_that_changes_a_little_changes_the_time_by_no_more(launch, mach
         value = number(machine, key)
         if isinstance(value, int) or (key == "memory.dram_efficiency" and percent > 0):
             continue
-        other = altered(machine, {key: value * (1 + percent / 100)}, "assumed", "a test")
+        other = altered(machine, {key: value * (1 + percent / 100)})
         assert abs(microseconds(launch, other) / before - 1) <= abs(percent) / 99, key
 
 
@@ -130,7 +130,7 @@ def test_events_that_change_a_little_change_the_time_by_no_more(launch, machine,
 def test_a_machine_at_half_of_every_pace_takes_twice_the_time(launch, machine):
     half = {"sm.clock_mhz": 0.5, "memory.dram_gb_per_s": 0.5, "launch.blocks_per_us": 0.5, "launch.kernel_us": 2.0}
     half |= {"atomics.unit_ns_per_request": 2.0, "atomics.conflict_ns": 2.0}
-    slow = altered(machine, {key: number(machine, key) * ratio for key, ratio in half.items()}, "assumed", "a test")
+    slow = altered(machine, {key: number(machine, key) * ratio for key, ratio in half.items()})
     try:
         before = microseconds(launch, machine)
     except TilestampError:
@@ -191,7 +191,7 @@ def test_a_larger_cache_moves_no_more_bytes_in_all(frame, share, cache, more):
         replace(launch_of(1), streams=tuple(Stream(name, op, size, int(share * size)) for name, op, size in launch))
         for launch in frame
     ]
-    caches = (altered(H200, {"memory.l2_bytes": size}, "assumed", "a test") for size in (cache, cache + more))
+    caches = (altered(H200, {"memory.l2_bytes": size}) for size in (cache, cache + more))
     less, much = (sum(moved.dram_bytes for moved in traffic(frame, machine)) for machine in caches)
     assert much <= less * ROUNDING + 1e-6
 
@@ -201,7 +201,7 @@ def test_a_larger_cache_moves_no_more_bytes_in_all(frame, share, cache, more):
 def test_more_sms_that_share_an_l2_cost_no_more_than_their_share(launch, sizes, more):
     """Each fetches from L2 what it keeps in its L1: the bytes grow by no more than the SMs, and so does the time."""
     what = replace(launch, streams=(Stream("table", "load", sizes[0], sizes[0], requested_bytes=sizes[1]),))
-    larger = altered(H200, {"sm.count": H200.sm.count + more}, "assumed", "a test")
+    larger = altered(H200, {"sm.count": H200.sm.count + more})
     try:
         before = microseconds(what, H200)
     except TilestampError:

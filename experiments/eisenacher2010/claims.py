@@ -9,7 +9,7 @@ from tilestamp.experiments.eisenacher2010.frames import (
     stand_in_warnings,
 )
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.result import Cell, Result, reported
 from tilestamp.simulator.run import Run
 
 QUESTION = "Do box tests save what the text says, and is the sample test efficiency of an 8x8 stamp 2 %?"
@@ -50,34 +50,10 @@ def run(progress: Progress) -> Result:
             status="reported",
             frame=KILLEROO,
         ),
-        Cell(
-            "8x8 stamp, warps that evaluate edges",
-            "STE",
-            "",
-            published=None,
-            ours=ste,
-            status="reported",
-            frame=KILLEROO,
-        ),
+        reported("8x8 stamp, warps that evaluate edges", "STE", "", ste, frame=KILLEROO),
         Cell("bound and split", "patches a second", "1/s", published=PATCHES_PER_SECOND, ours=rate, frame=KILLEROO),
-        Cell(
-            "edges loaded, not computed",
-            "dice and tile raster",
-            "ms",
-            published=None,
-            ours=loaded_ms,
-            status="reported",
-            frame=KILLEROO,
-        ),
-        Cell(
-            "edges computed by each thread",
-            "dice and tile raster",
-            "ms",
-            published=None,
-            ours=computed_ms,
-            status="reported",
-            frame=KILLEROO,
-        ),
+        reported("edges loaded, not computed", "dice and tile raster", "ms", loaded_ms, frame=KILLEROO),
+        reported("edges computed by each thread", "dice and tile raster", "ms", computed_ms, frame=KILLEROO),
     ]
     return Result(
         name="eisenacher2010-claims",

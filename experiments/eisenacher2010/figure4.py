@@ -6,7 +6,7 @@ import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, SOURCE, frame, overhead_ms, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.reports.plots import lines
 
 QUESTION = "Which tile size is the fastest, near and far?"
@@ -61,15 +61,7 @@ def _answer(table: pd.DataFrame) -> str:
 def _cells(table: pd.DataFrame) -> list[Cell]:
     """The order at each zoom level, and the times that make it."""
     times = [
-        Cell(
-            f"zoom {row.zoom}",
-            f"{row.tile} tiles",
-            "ms",
-            published=None,
-            ours=row.ms,
-            status="reported",
-            frame=_frame(row.zoom),
-        )
+        reported(f"zoom {row.zoom}", f"{row.tile} tiles", "ms", row.ms, frame=_frame(row.zoom))
         for row in table.itertuples()
     ]
     return [*(_order(table, zoom) for zoom in ZOOMS), *times]

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.picture import picture

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way
 from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.stability.cracks import CURES, SEEDS, Cure, crack_pixels, frame, front_end, snapped
 from tilestamp.experiments.stability.patch_frames import MACHINE, milliseconds
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tilestamp.experiments.exploration.quad_merging import mesh
 from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.methods_plot import side_by_side
 from tilestamp.reports.plots import lines

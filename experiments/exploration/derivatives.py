@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from tilestamp.experiments.frontier.methods_scenes import Subject, textured_subject
 from tilestamp.experiments.frontier.methods_truth import Truth
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import heat_maps
 from tilestamp.simulator.run import Run

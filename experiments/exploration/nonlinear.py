@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.reports.frontier_plot import frontier
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines
@@ -96,10 +96,7 @@ def _row(method: str, drawn: Run, right: NDArray[np.int32] | None) -> dict[str, 
 
 def _cells(table: pd.DataFrame) -> list[Cell]:
     return [
-        Cell(
-            f"{r['kind']}, {r['triangles']} triangles, {r['method']}", column, unit, published=None, ours=r[column],
-            status="reported",
-        )
+        reported(f"{r['kind']}, {r['triangles']} triangles, {r['method']}", column, unit, r[column])
         for r in table.to_dict("records")
         for column, unit in (("ms", "ms"), ("wrong", "share of pixels"))
     ]  # fmt: skip

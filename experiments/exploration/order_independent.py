@@ -19,8 +19,8 @@ from tilestamp.experiments.exploration.transparent_scenes import confetti
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.reports.methods_plot import panels
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines

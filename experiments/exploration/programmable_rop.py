@@ -12,8 +12,8 @@ import pandas as pd
 
 from tilestamp.experiments.exploration.transparent_scenes import confetti, piles
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.run import Run

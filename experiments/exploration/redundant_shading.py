@@ -17,8 +17,8 @@ import pandas as pd
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, megabytes, milliseconds, other_pixels
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.events import MachineEvent
 from tilestamp.models.launch import Launch
 from tilestamp.models.price import price

@@ -13,9 +13,9 @@ import pandas as pd
 
 from tilestamp.experiments.exploration.ways import MACHINES, SIZE, Way, other_pixels
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.stability.patch_frames import flat_patch
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.reports.plots import lines
 from tilestamp.reports.ste_plots import wrong_pixels
 from tilestamp.simulator.scenes.scene import Patches, Scene

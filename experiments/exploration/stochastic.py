@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.frontier.picture_error import flip
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.reports.frontier_plot import frontier
 from tilestamp.reports.picture import picture
 from tilestamp.reports.plots import lines
@@ -128,10 +128,7 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     cells = []
     for r in table.to_dict("records"):
         name = f"{r['method']}, polygons of {r['edge']:g} px, motion {r['motion']:g} px, circle {r['lens']:g} px"
-        cells += [
-            Cell(name, column, unit, published=None, ours=r[column], status="reported")
-            for column, unit in (("ms", "ms"), ("ste", "%"))
-        ]
+        cells += [reported(name, column, unit, r[column]) for column, unit in (("ms", "ms"), ("ste", "%"))]
     return cells
 
 

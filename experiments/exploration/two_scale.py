@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tilestamp.experiments.exploration.ways import SIZE, Way, other_pixels
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.choice_map import choice_map
 from tilestamp.reports.heatmap import heat_map

@@ -35,7 +35,7 @@ from tilestamp.experiments.frontier.model_frames import is_long
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.frontier.picture_error import depth_errors, pixel_errors
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.reports.methods_plot import panels, side_by_side
 from tilestamp.simulator.reference.picture import SIDE
@@ -210,26 +210,8 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     for scene, rows in table[table.machine == MACHINES[0]].groupby("scene", sort=False):
         front = rows[rows.front_flip].sort_values("ms")
         for column, point in (("cheapest", front.iloc[0]), ("least FLIP", front.iloc[-1])):
-            cells.append(
-                Cell(
-                    f"{scene}: {point.method}",
-                    f"{column}, time",
-                    "ms",
-                    published=None,
-                    ours=float(point.ms),
-                    status="reported",
-                )
-            )
-            cells.append(
-                Cell(
-                    f"{scene}: {point.method}",
-                    f"{column}, FLIP",
-                    "",
-                    published=None,
-                    ours=float(point.flip),
-                    status="reported",
-                )
-            )
+            cells.append(reported(f"{scene}: {point.method}", f"{column}, time", "ms", float(point.ms)))
+            cells.append(reported(f"{scene}: {point.method}", f"{column}, FLIP", "", float(point.flip)))
     return cells
 
 

@@ -16,7 +16,7 @@ from tilestamp.experiments.frontier.model_notes import BOUNDS, COUNTS, FULL, not
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result, reported
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.launch import Launch
 from tilestamp.models.price import Fidelity
@@ -147,23 +147,14 @@ def _cells(ours: pd.DataFrame, theirs: pd.DataFrame) -> list[Cell]:
         "mean error against known times": ("error_against_known", "%", 100),
     }
     cells = [
-        Cell(row["method"], column, unit, published=None, ours=scale * row[name], status="reported")
+        reported(row["method"], column, unit, scale * row[name])
         for row in ours.to_dict("records")
         for column, (name, unit, scale) in shown.items()
         if not isnan(row[name])
     ]
     for row in theirs[theirs.seconds.notna()].to_dict("records"):
         speed = str(row["speed_mark"]).partition(":")[0]
-        cells.append(
-            Cell(
-                row["name"],
-                f"the mean frame at its {speed} speed",
-                "s",
-                published=None,
-                ours=row["seconds"],
-                status="reported",
-            )
-        )
+        cells.append(reported(row["name"], f"the mean frame at its {speed} speed", "s", row["seconds"]))
     return cells
 
 

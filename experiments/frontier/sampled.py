@@ -26,7 +26,7 @@ import pandas as pd
 
 from tilestamp.experiments.frontier.sampled_boxes import boxes
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Chart, Figure, Result, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.plots import lines
@@ -217,13 +217,15 @@ def _primitives(full: Run) -> int:
 def _cells(table: pd.DataFrame) -> list[Cell]:
     numbers = {"share of the full run": ("share", "of full", 1), "error": ("error", "%", 100)}
     return [
-        Cell(
-            f"{row['scene']} ({row['primitives']:,})", f"{row['method']}, {row['rate']:.0%}: {column}", unit,
-            published=None, ours=round(scale * row[name], 4), status="reported",
+        reported(
+            f"{row['scene']} ({row['primitives']:,})",
+            f"{row['method']}, {row['rate']:.0%}: {column}",
+            unit,
+            round(scale * row[name], 4),
         )
         for row in table.to_dict("records")
         for column, (name, unit, scale) in numbers.items()
-    ]  # fmt: skip
+    ]
 
 
 def _answer(table: pd.DataFrame) -> str:

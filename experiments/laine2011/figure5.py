@@ -9,7 +9,7 @@ import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, CellFigure, Result
+from tilestamp.experiments.harness.result import Cell, CellFigure, Result, reported
 from tilestamp.experiments.laine2011.sweep import (
     PUBLISHED_AREAS,
     SOURCE,
@@ -122,10 +122,7 @@ def _summary(cells: list[Cell]) -> list[Cell]:
                 f"median error (aim {MEDIAN_AIM:.0%})": float(np.median(errors)),
                 f"worst error (aim {WORST_AIM:.0%})": max(errors),
             }
-            summary += [
-                Cell("predicted", f"{stage}: {name}", "%", published=None, ours=100 * e, status="reported")
-                for name, e in found.items()
-            ]
+            summary += [reported("predicted", f"{stage}: {name}", "%", 100 * e) for name, e in found.items()]
     return summary
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.experiments.laine2011.sweep import MACHINE, SOURCE, STAGES, areas, draw, nanoseconds
 from tilestamp.reports.plots import lines
 
@@ -25,19 +25,8 @@ def run(progress: Progress) -> Result:
         there, _ = draw(area, OTHER)
         old, new = nanoseconds(made, triangles), nanoseconds(there, triangles)
         for stage in STAGES:
-            cells.append(
-                Cell(f"{area:g} px", stage, f"ns/triangle, {OTHER}", published=None, ours=new[stage], status="reported")
-            )
-            cells.append(
-                Cell(
-                    f"{area:g} px",
-                    stage,
-                    f"{OTHER} : {MACHINE}",
-                    published=None,
-                    ours=new[stage] / old[stage],
-                    status="reported",
-                )
-            )
+            cells.append(reported(f"{area:g} px", stage, f"ns/triangle, {OTHER}", new[stage]))
+            cells.append(reported(f"{area:g} px", stage, f"{OTHER} : {MACHINE}", new[stage] / old[stage]))
             bound = str(there.stages.loc[stage, "bound"])
             rows.append(
                 {"area": area, "stage": stage, "ns": new[stage], "ratio": new[stage] / old[stage], "bound": bound}

@@ -8,22 +8,13 @@ start together, and each takes about 2 us longer than on the stream.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
-import pandas as pd
-
 from tilestamp.experiments.harness.result import Result
-from tilestamp.experiments.silicon.textured_compare import SPAN, Drawn, by_kernel, cells, entry, rows, sentences
-from tilestamp.experiments.silicon.textured_inputs import (
-    SPAN_METRIC,
-    VARIABLE,
-    Measured,
-    measured_scenes,
-    read_measured,
-)
+from tilestamp.experiments.silicon.textured_compare import SPAN, Drawn, compared, entry, rows
+from tilestamp.experiments.silicon.textured_inputs import SPAN_METRIC, VARIABLE, Measured, read_measured
 from tilestamp.experiments.zhang2025.graph import nodes
-from tilestamp.models.errors import MissingInputError
 from tilestamp.models.fitted import Fitted
 from tilestamp.models.launch_graph import as_graph, on_stream
 from tilestamp.simulator.run import Run
@@ -56,25 +47,14 @@ EVENTS = {  # of the sources on a CPU: kernel, metric, ours, how many of ours ar
 
 def run(progress: Callable[[str], None]) -> Result:
     """Draw and price every measured frame."""
-    try:
-        names = measured_scenes("zh")
-    except MissingInputError as missing:
-        return Result(name=NAME, title=TITLE, source=SOURCE, cells=[], warnings=[str(missing)])
-    found: list[dict[str, Any]] = []
-    for name in names:
-        measured = read_measured(name)
-        for config in ("stream", "stream_textured"):
-            progress(f"{name} {config}")
-            found += _rows(measured, config)
-    table = pd.DataFrame(found)
-    return Result(
-        name=NAME,
-        title=TITLE,
-        source=SOURCE,
-        cells=cells(table),
-        notes=sentences(table),
-        tables={"all": table, "kernels": by_kernel(table)},
-    )
+    return compared(NAME, TITLE, SOURCE, "zh", partial(_frames, progress))
+
+
+def _frames(progress: Callable[[str], None], measured: Measured) -> Iterator[dict[str, Any]]:
+    """Both frames of a scene."""
+    for config in ("stream", "stream_textured"):
+        progress(f"{measured.name} {config}")
+        yield from _rows(measured, config)
 
 
 def _rows(measured: Measured, config: str) -> Iterator[dict[str, Any]]:

@@ -1,15 +1,22 @@
 """Frames of the two textured rasterizers, priced as they were measured, beside the measurements."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell
-from tilestamp.experiments.silicon.textured_inputs import FRAME_METRIC, TIME_METRIC, Measured
+from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.silicon.textured_inputs import (
+    FRAME_METRIC,
+    TIME_METRIC,
+    Measured,
+    measured_scenes,
+    read_measured,
+)
 from tilestamp.experiments.validation.quantities import MOVED, MOVED_AIM, QUANTITIES, SHORTEST_US, TIME, TIME_AIM
+from tilestamp.models.errors import MissingInputError
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.price import price
 from tilestamp.models.timing import Timing
@@ -125,6 +132,19 @@ def _sentence(r: dict[Any, Any]) -> str:
     ratios = f"ours over measured {r['ratio']:.2f} ({r['lowest']:.2f} to {r['highest']:.2f})"
     errors = f"mean error {100 * r['mean']:.1f} %, worst {100 * r['worst']:.0f} %"
     return f"{r['kernel']}, {r['quantity']}: {r['cells']} cells, {ratios}, {errors}."
+
+
+def compared(
+    name: str, title: str, source: str, system: str, rows_of: Callable[[Measured], Iterator[dict[str, Any]]]
+) -> Result:
+    """All frames that were measured of a system (``ru``, ``zh``) beside ours, or what is missing for that."""
+    try:
+        scenes = measured_scenes(system)
+    except MissingInputError as missing:
+        return Result(name=name, title=title, source=source, cells=[], warnings=[str(missing)])
+    table = pd.DataFrame([row for scene in scenes for row in rows_of(read_measured(scene))])
+    tables = {"all": table, "kernels": by_kernel(table)}
+    return Result(name=name, title=title, source=source, cells=cells(table), notes=sentences(table), tables=tables)
 
 
 def cells(table: pd.DataFrame) -> list[Cell]:

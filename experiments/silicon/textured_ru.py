@@ -5,14 +5,12 @@ occlusion: every kernel and memset of every configuration that was measured (``t
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
-import pandas as pd
-
 from tilestamp.experiments.harness.result import Result
-from tilestamp.experiments.silicon.textured_compare import Drawn, by_kernel, cells, rows, sentences
-from tilestamp.experiments.silicon.textured_inputs import VARIABLE, Measured, measured_scenes, read_measured
-from tilestamp.models.errors import MissingInputError
+from tilestamp.experiments.silicon.textured_compare import Drawn, compared, rows
+from tilestamp.experiments.silicon.textured_inputs import VARIABLE, Measured
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.simulation import simulate
 
@@ -38,28 +36,17 @@ CLEARED = {"clear_colors": 12, "clear_fragments": 56}  # bytes a pixel
 
 def run(progress: Callable[[str], None]) -> Result:
     """Draw and price every measured frame."""
-    try:
-        names = measured_scenes("ru")
-    except MissingInputError as missing:
-        return Result(name="silicon-textured_ru", title=TITLE, source=SOURCE, cells=[], warnings=[str(missing)])
-    found: list[dict[str, Any]] = []
-    for name in names:
-        measured = read_measured(name)
-        for drawn in drawn_frames(measured):
-            progress(f"{name} {drawn.config}")
-            found += rows(measured, drawn)
-    table = pd.DataFrame(found)
-    return Result(
-        name="silicon-textured_ru",
-        title=TITLE,
-        source=SOURCE,
-        cells=cells(table),
-        notes=sentences(table),
-        tables={"all": table, "kernels": by_kernel(table)},
-    )
+    return compared("silicon-textured_ru", TITLE, SOURCE, "ru", partial(_rows, progress))
 
 
 TITLE = "H200, Ru 2016's kernels, model against machine"
+
+
+def _rows(progress: Callable[[str], None], measured: Measured) -> Iterator[dict[str, Any]]:
+    """Each frame of a scene."""
+    for drawn in drawn_frames(measured):
+        progress(f"{measured.name} {drawn.config}")
+        yield from rows(measured, drawn)
 
 
 def drawn_frames(measured: Measured) -> Iterator[Drawn]:

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from tilestamp.experiments.frontier.pareto import pareto_front
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.splats.host import frame_ms
-from tilestamp.experiments.studies_shipped.finding import finding, reported
+from tilestamp.experiments.studies_shipped.finding import finding
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
 from tilestamp.reports.methods_plot import panels

@@ -7,7 +7,7 @@ from typing import Literal
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 
 Scale = Literal["log", "linear", "integer"]
 TOLERANCE = {"log": 0.01, "linear": 0.01, "integer": 1.0}  # ratio - 1; share of the range; units
@@ -166,15 +166,7 @@ def _cells(boundary: Boundary) -> list[Cell]:
     breaks: float | str = "none tried" if boundary.breaks is None else boundary.breaks
     columns = (("holds at", holds), ("breaks at", breaks))
     return [
-        Cell(
-            boundary.method,
-            f"{boundary.parameter} {column}",
-            boundary.unit,
-            published=None,
-            ours=value,
-            status="reported",
-        )
-        for column, value in columns
+        reported(boundary.method, f"{boundary.parameter} {column}", boundary.unit, value) for column, value in columns
     ]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.models.price import price
@@ -57,14 +57,7 @@ def run(progress: Callable[[str], None]) -> Result:
             rows += [_timed(polygons, area, name, machine) for name in ALGORITHMS]
     table = pd.DataFrame(rows)
     cells = [
-        Cell(
-            f"{r['machine']}, {r['area']:g} px",
-            f"{r['algorithm']} ({r['bound']})",
-            "ns a polygon",
-            published=None,
-            ours=r["ns"],
-            status="reported",
-        )
+        reported(f"{r['machine']}, {r['area']:g} px", f"{r['algorithm']} ({r['bound']})", "ns a polygon", r["ns"])
         for r in rows
     ]
     figures = [_figure(table, machine) for machine in MACHINES]

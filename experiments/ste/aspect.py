@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
@@ -44,7 +44,7 @@ def run(progress: Callable[[str], None]) -> Result:
         rows += [{"area": area, "aspect": aspect, **_measure(area, aspect)} for aspect in ASPECTS]
     table = pd.DataFrame(rows)
     cells = [
-        Cell(f"{row['area']:g} px, {row['aspect']}:1", name, unit, published=None, ours=row[column], status="reported")
+        reported(f"{row['area']:g} px, {row['aspect']}:1", name, unit, row[column])
         for row in rows
         for column, name, unit in COLUMNS
     ]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.experiments.ste.readings import WANTED, Reading, as_table, readings, said
 from tilestamp.experiments.ste.setting import Model, bigguy, cube, mean_area
 from tilestamp.models.simt import Simt
@@ -114,17 +114,7 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
     under = [row for row in rows if row["model"] == "bigguy" and row["ste"] < PAPER_STE]
     for near in sorted(under, key=lambda row: -row["ste"])[:1]:
         place, frame = f"bigguy level {near['level']}, height {near['height']}", f"bigguy {near['height']}"
-        cells.append(
-            Cell(
-                place,
-                "STE without the mask (published: below 3)",
-                "%",
-                published=None,
-                ours=near["ste"],
-                status="reported",
-                frame=frame,
-            )
-        )
+        cells.append(reported(place, "STE without the mask (published: below 3)", "%", near["ste"], frame=frame))
         cells.append(Cell(place, "gain", "x", published=WANTED["bigguy"], ours=near["gain"], aim=0.1, frame=frame))
     for row in rows:
         if row["model"] == "cube" and row["level"] == 7:
@@ -132,23 +122,18 @@ def _cells(table: pd.DataFrame) -> list[Cell]:
             cells.append(Cell(place, "gain", "x", published=WANTED["cube"], ours=row["gain"], aim=0.1))
     for row in rows:
         place, frame = f"{row['model']} level {row['level']}, height {row['height']}", f"{row['model']} {row['height']}"
-        cells += [
-            Cell(place, name, unit, published=None, ours=float(row[column]), status="reported", frame=frame)
-            for column, name, unit in REPORTED
-        ]
+        cells += [reported(place, name, unit, float(row[column]), frame=frame) for column, name, unit in REPORTED]
     return cells
 
 
 def _reading_cells(found: list[Reading]) -> list[Cell]:
     """Every reading's gain at the setting that comes nearest to the claim."""
     return [
-        Cell(
+        reported(
             f"reading: {reading.name}",
             f"{model}, gain nearest to {wanted:g}",
             "x",
-            published=None,
-            ours=min(getattr(reading, model), key=lambda gain: abs(gain - wanted)),
-            status="reported",
+            min(getattr(reading, model), key=lambda gain: abs(gain - wanted)),
             frame=model,
         )
         for reading in found

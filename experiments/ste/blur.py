@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.ste.setting import random_polygons
 from tilestamp.models.events import INSTRUCTION_CLASSES
 from tilestamp.models.simt import Simt
@@ -59,24 +59,14 @@ def run(progress: Callable[[str], None]) -> Result:
             rows += _measure(way, radius)
     table = pd.DataFrame(rows)
     cells = [
-        Cell(
-            f"{r['way']:g} px, circle {r['radius']:g} px",
-            f"{r['algorithm']}, STE",
-            "%",
-            published=None,
-            ours=r["ste"],
-            status="reported",
-        )
-        for r in rows
+        reported(f"{r['way']:g} px, circle {r['radius']:g} px", f"{r['algorithm']}, STE", "%", r["ste"]) for r in rows
     ]
     cells += [
-        Cell(
+        reported(
             f"{r['way']:g} px, circle {r['radius']:g} px",
             f"{r['algorithm']}, cost",
             "instructions a polygon",
-            published=None,
-            ours=r["cost"],
-            status="reported",
+            r["cost"],
         )
         for r in rows
     ]

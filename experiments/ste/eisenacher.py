@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.experiments.ste.closed_form import expected
 from tilestamp.experiments.ste.setting import mean_area, random_polygons
 from tilestamp.models.errors import TilestampError
@@ -37,16 +37,7 @@ def run(progress: Callable[[str], None]) -> Result:
     """Sweep the area, then measure the scenes."""
     progress("8x8 stamp over polygon area")
     sweep = pd.DataFrame([_swept(area) for area in AREAS])
-    cells = [
-        Cell(
-            "square, closed form",
-            "area at 2 %",
-            "pixels",
-            published=None,
-            ours=_area_at(QUOTED / 100),
-            status="reported",
-        )
-    ]
+    cells = [reported("square, closed form", "area at 2 %", "pixels", _area_at(QUOTED / 100))]
     rows, warnings = [], []
     for name in SCENES:
         progress(f"{name} at {SIZE[0]}x{SIZE[1]}")

@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.questions.best import Boundary, boundaries
 from tilestamp.experiments.studies.study import Study
-from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
+from tilestamp.experiments.studies_shipped.finding import finding, table_of
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes import Scene
 

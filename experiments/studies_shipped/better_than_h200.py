@@ -16,11 +16,11 @@ import pandas as pd
 
 from tilestamp.experiments.frontier.methods_scenes import sheets
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.questions.space import values_at
 from tilestamp.experiments.studies.area import L2_MB, MEGABYTE, area, sm_area
 from tilestamp.experiments.studies.study import Study
-from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
+from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import altered, load_machine
 from tilestamp.reports.tornado import tornado

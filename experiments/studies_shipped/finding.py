@@ -35,8 +35,3 @@ def finding(
         figures=list(figures), charts=list(charts),
         notes=list(notes), warnings=list(warnings), tables=dict(tables),
     )  # fmt: skip
-
-
-def reported(row: str, column: str, unit: str, ours: float | str, frame: str = "") -> Cell:
-    """A cell beside which nothing is published."""
-    return Cell(row, column, unit, published=None, ours=ours, status="reported", frame=frame)

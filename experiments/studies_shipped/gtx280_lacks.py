@@ -13,9 +13,9 @@ import pandas as pd
 
 from tilestamp.experiments.eisenacher2010.frames import KILLEROO, MACHINE, frame, stand_in_warnings
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Chart, Figure, Result
+from tilestamp.experiments.harness.result import Chart, Figure, Result, reported
 from tilestamp.experiments.questions.best import Boundary, best_values, boundaries
-from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
+from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, altered, load_machine
 from tilestamp.reports.plots import lines

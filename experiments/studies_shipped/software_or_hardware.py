@@ -6,10 +6,10 @@ import pandas as pd
 
 from tilestamp.experiments.frontier.methods_scenes import sheets
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Figure, Result
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.questions.best import Boundary, boundaries
 from tilestamp.experiments.studies.study import Study
-from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
+from tilestamp.experiments.studies_shipped.finding import finding, table_of
 from tilestamp.reports.plots import lines
 
 QUESTION = "For which sizes of triangles is software as fast as hardware?"

@@ -5,10 +5,10 @@ from typing import Any
 import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Chart, Figure, Result
+from tilestamp.experiments.harness.result import Chart, Figure, Result, reported
 from tilestamp.experiments.questions import answers
 from tilestamp.experiments.studies.study import Study
-from tilestamp.experiments.studies_shipped.finding import finding, reported, table_of
+from tilestamp.experiments.studies_shipped.finding import finding, table_of
 from tilestamp.models.machine import list_machines
 
 QUESTION = "Which tile size is the fastest, on which machine, at which zoom and bound?"

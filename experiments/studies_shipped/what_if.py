@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Chart, Figure, Result
-from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding, reported
+from tilestamp.experiments.harness.result import Chart, Figure, Result, reported
+from tilestamp.experiments.studies_shipped.finding import WHAT_IF, finding
 from tilestamp.reports.heatmap import heat_map
 from tilestamp.reports.picture import picture
 from tilestamp.simulator.run import Run

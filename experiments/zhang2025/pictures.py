@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import load_machine
 from tilestamp.reports.style import figure
@@ -82,8 +82,8 @@ def _difference(name: str, off: Frame, on: Frame) -> list[Cell]:
     rms = float(np.sqrt((change**2).mean()))
     share = float((change != 0.0).any(axis=2).mean())
     return [
-        Cell(name, "RMS difference", "of 255", published=None, ours=rms, status="reported"),
-        Cell(name, "pixels that change", "%", published=None, ours=100.0 * share, status="reported"),
+        reported(name, "RMS difference", "of 255", rms),
+        reported(name, "pixels that change", "%", 100.0 * share),
     ]
 
 

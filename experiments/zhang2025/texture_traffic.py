@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
 from tilestamp.models.machine import load_machine
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
@@ -83,9 +83,7 @@ def run(progress: Callable[[str], None]) -> Result:
                     )  # fmt: skip
                 label = f"{texture_filter}, {degrees} degrees, {minification:g} texels a pixel"
                 ratio = counts["tiles 4x4"] / counts["rows"]
-                cells.append(
-                    Cell(label, "tiles 4x4 / rows, transactions", "1", published=None, ours=ratio, status="reported")
-                )
+                cells.append(reported(label, "tiles 4x4 / rows, transactions", "1", ratio))
                 wide.append(counts["tiles 8x8"] / counts["rows"])
     table = pd.DataFrame(rows)
     shown = table[(table["filter"] == "bilinear") & (table.layout != "tiles 8x8")]

@@ -104,16 +104,7 @@ def thread_per_item(
     table = np.empty((blocks + idle_blocks, len(ThreadEvent)), np.int64)
     table[: blocks - 1], table[blocks - 1] = rows
     table[blocks:] = [0] * ThreadEvent.IDLE_WARPS + [most]
-    return Work(
-        stage=stage,
-        kernel=kernel,
-        events=ThreadEvent,
-        table=table,
-        grid=len(table),
-        block=block,
-        streams=tuple(streams),
-        variant=variant,
-    )
+    return Work(stage, ThreadEvent, table, block, kernel=kernel, streams=tuple(streams), variant=variant)
 
 
 @cache

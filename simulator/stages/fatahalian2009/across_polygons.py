@@ -17,25 +17,22 @@ import numpy as np
 from tilestamp.models.coalescing import contiguous
 from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
-    blocks,
     count_hits,
     keep_nearest,
     pixel_box,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
-from tilestamp.simulator.work import Work
 
 Packing = Literal["in-order", "sorted", "repacked"]
 PACKINGS: tuple[Packing, ...] = get_args(Packing)
 CHUNK = 256  # polygons that a warp draws from the queue
-WARPS = 4  # in a block
 SORT_STEPS = 36  # compare-exchange steps of a bitonic sort of 256 keys: 8 * 9 / 2
 BOX = 5  # columns of a lane's walk: x0, y0, x1, y1, and samples done
 
@@ -80,27 +77,10 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     idle_to_refill = simt.warp // 2 if packing == "repacked" else simt.warp
     _across_polygons(polygons.vertices, samples, packing == "sorted", idle_to_refill, simt, table)
     events = AcrossPolygonsEvent
-    streams = (
-        Stream("micropolygons", "load", int(table[:, events.LOAD_BYTES].sum()), polygons.vertices.nbytes),
-        Stream(
-            "samples",
-            "atomic",
-            int(table[:, events.ATOMIC_REQUESTS].sum()) * 32,
-            int(np.count_nonzero(samples.requests)) * 32,
-        ),
-    )
-    shared = CHUNK * 4 * WARPS if packing == "sorted" else 0  # a key and an index of 16 bits each
-    work = Work(
-        stage="across_polygons",
-        kernel="across_polygons",
-        events=events,
-        table=table,
-        grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
-        shared_bytes=shared,
-        dispatch="warp_queue",
-        streams=streams,
-        atomic_requests=samples.requests,
+    shared = CHUNK * 4 if packing == "sorted" else 0  # a key and an index of 16 bits each
+    streams = sample_streams(polygons.vertices.nbytes, samples, events, table)
+    work = warp_queue(
+        "across_polygons", events, table, simt, shared_bytes=shared, streams=streams, atomic_requests=samples.requests
     )
     return StageResult(samples, (work,))
 

@@ -26,13 +26,12 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     new_setup,
     set_up,
 )
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, keep_nearest, on_screen
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, on_screen
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import warp_queue
 from tilestamp.simulator.stages.fatahalian2010.merge_buffer import PIXELS, MergeBuffer, find, join, new_buffer, start
-from tilestamp.simulator.work import Work
 
 BATCH = 1024  # polygons that a warp takes from the queue together
-WARPS = 4  # in a block
 QUAD_BYTES = 16  # polygon, place, covered samples: written by the rasterizer, read here; both are counted here
 COLOR_BYTES = 4
 ENTRY_BYTES = 48  # of the buffer in shared memory: place and facing, samples, polygon at each pixel, and vertices
@@ -118,17 +117,7 @@ def quad_shading(
         Stream("quads", "store", quads, quads),
         Stream("colors", "store", colors, min(colors, COLOR_BYTES * len(shaded.seen))),
     )
-    work = Work(
-        stage="quad_shading",
-        kernel="quad_shading",
-        events=QuadEvent,
-        table=table,
-        grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
-        shared_bytes=WARPS * ENTRY_BYTES * entries,
-        dispatch="warp_queue",
-        streams=streams,
-    )
+    work = warp_queue("quad_shading", QuadEvent, table, simt, shared_bytes=ENTRY_BYTES * entries, streams=streams)
     return StageResult(shaded, (work,))
 
 

@@ -208,20 +208,19 @@ def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int 
     used = min(count, entries)
     span = (POSITION_BYTES + CONIC_BYTES + 4 * COLOURS) * used  # neighbouring tiles list the same Gaussians
     several = f" threads {threads}" if threads < tiles.pixels else ""
+    streams = (
+        Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
+        Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),
+        Stream("conics", "load", 32 * entries, CONIC_BYTES * used, span_bytes=span),
+        Stream("colours", "load", 32 * fetches, 4 * COLOURS * used, span_bytes=span),
+        Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * pixels),
+    )
     return Work(
-        stage="blend",
-        kernel="blend",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=threads,
+        "blend",
+        _E,
+        table,
+        threads,
         shared_bytes=(SHARED_BYTES + BOX_BYTES * mask) * threads,
         variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}{' mask' if mask else ''}",
-        streams=(
-            Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
-            Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),
-            Stream("conics", "load", 32 * entries, CONIC_BYTES * used, span_bytes=span),
-            Stream("colours", "load", 32 * fetches, 4 * COLOURS * used, span_bytes=span),
-            Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * pixels),
-        ),
+        streams=streams,
     )

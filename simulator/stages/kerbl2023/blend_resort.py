@@ -183,21 +183,21 @@ def resort_work(table: NDArray[np.int64], tiles: Tiles, window: int, count: int 
     total = dict(zip(_E, table.sum(axis=0).tolist(), strict=True))
     entries, used = total[_E.ENTRIES], min(count, total[_E.ENTRIES])
     span = (POSITION_BYTES + CONIC_BYTES + 4 * COLOURS + sum(RAY_BYTES)) * used
+    streams = (
+        Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
+        Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),
+        Stream("conics", "load", 32 * entries, CONIC_BYTES * used, span_bytes=span),
+        Stream("rays", "load", 32 * len(RAY_BYTES) * entries, sum(RAY_BYTES) * used, span_bytes=span),
+        Stream("colours", "load", 32 * COLOURS * total[_E.BLENDED], 4 * COLOURS * used, span_bytes=span),
+        Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * total[_E.PIXELS]),
+    )
     return Work(
-        stage="blend",
+        "blend",
+        _E,
+        table,
+        tiles.pixels,
         kernel="blend_resort",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=tiles.pixels,
         shared_bytes=(SHARED_BYTES + 4 * RAY_WORDS) * tiles.pixels,
         variant=f"window {window}",
-        streams=(
-            Stream("values", "load", INDEX_BYTES * entries, INDEX_BYTES * entries),
-            Stream("positions", "load", 32 * entries, POSITION_BYTES * used, span_bytes=span),
-            Stream("conics", "load", 32 * entries, CONIC_BYTES * used, span_bytes=span),
-            Stream("rays", "load", 32 * len(RAY_BYTES) * entries, sum(RAY_BYTES) * used, span_bytes=span),
-            Stream("colours", "load", 32 * COLOURS * total[_E.BLENDED], 4 * COLOURS * used, span_bytes=span),
-            Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * total[_E.PIXELS]),
-        ),
+        streams=streams,
     )

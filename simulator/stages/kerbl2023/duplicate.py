@@ -277,12 +277,11 @@ def duplicate_work(table: NDArray[np.int64], bound: str, size: int) -> Work:
     if bound != "square":
         streams.append(Stream("conics", "load", 16 * visible, 16 * visible))
     return Work(
-        stage="duplicate",
+        "duplicate",
+        _E,
+        table,
+        BLOCK,
         kernel="duplicate" if bound == "square" else "tight_duplicate",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
         streams=tuple(streams),
         variant="" if bound == "square" else bound,
     )

@@ -94,18 +94,17 @@ def requests(uses: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _work(table: NDArray[np.int64], wanted: NDArray[np.int64], tiles: Tiles, pairs: int, atomics: Atomics) -> Work:
     moved, requested = SECTOR_BYTES * ENTRY_SECTORS * pairs, SECTOR_BYTES * int(wanted.sum())
+    streams = (
+        Stream("entries", "load", moved, moved),
+        Stream("gradients", "atomic", requested, CHUNK_BYTES * len(wanted)),
+    )
     return Work(
-        stage="gradients",
-        kernel="gradients",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=tiles.pixels,
+        "gradients",
+        _E,
+        table,
+        tiles.pixels,
         shared_bytes=SHARED_BYTES * tiles.pixels,
-        streams=(
-            Stream("entries", "load", moved, moved),
-            Stream("gradients", "atomic", requested, CHUNK_BYTES * len(wanted)),
-        ),
+        streams=streams,
         atomic_requests=wanted,
         variant=atomics,
     )

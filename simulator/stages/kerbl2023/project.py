@@ -219,12 +219,4 @@ def project_work(table: NDArray[np.int64]) -> Work:
         lanes = int(total[(_E.GAUSSIANS, _E.NEAR_LANES, _E.SQUARE_LANES, _E.VISIBLE)[level]])
         if stride:
             streams.append(Stream(name, "store" if stored else "load", lanes * words * size, lanes * stride))
-    return Work(
-        stage="project",
-        kernel="project",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=tuple(streams),
-    )
+    return Work("project", _E, table, BLOCK, streams=tuple(streams))

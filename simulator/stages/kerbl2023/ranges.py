@@ -83,15 +83,8 @@ def _work(table: NDArray[np.int64], keys: NDArray[np.unsignedinteger], tiles: in
     table[:, _E.LOAD_TRANSACTIONS] = 2 * one + table[:, _E.WARPS]  # the key, and that of the thread before
     table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * SECTOR_BYTES
     table[:, _E.STORE_BYTES] = table[:, _E.STORE_TRANSACTIONS] * SECTOR_BYTES
-    return Work(
-        stage="ranges",
-        kernel="ranges",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=(
-            Stream("keys", "load", 2 * size * pairs, size * pairs),
-            Stream("ranges", "store", int(table[:, _E.STORE_BYTES].sum()), 8 * tiles),
-        ),
+    streams = (
+        Stream("keys", "load", 2 * size * pairs, size * pairs),
+        Stream("ranges", "store", int(table[:, _E.STORE_BYTES].sum()), 8 * tiles),
     )
+    return Work("ranges", _E, table, BLOCK, streams=streams)

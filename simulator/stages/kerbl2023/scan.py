@@ -53,18 +53,10 @@ def scan_works(count: int, simt: Simt) -> tuple[Work, Work]:
     table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] += np.multiply(LOOK_BACK_LOADS, (1, segment))
     table[:, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES]] += np.multiply(LOOK_BACK_STORES, (1, segment))
     total = 4 * count
-    summed = Work(
-        stage="scan",
-        kernel="scan",
-        events=_E,
-        table=table,
-        grid=blocks,
-        block=BLOCK,
-        shared_bytes=SHARED_BYTES,
-        streams=(
-            Stream("tiles", "load", total, total),
-            Stream("scan_state", "load", 8 * blocks, 8 * blocks),
-            Stream("offsets", "store", total, total, partial_lines=0),
-        ),
+    streams = (
+        Stream("tiles", "load", total, total),
+        Stream("scan_state", "load", 8 * blocks, 8 * blocks),
+        Stream("offsets", "store", total, total, partial_lines=0),
     )
+    summed = Work("scan", _E, table, BLOCK, grid=blocks, shared_bytes=SHARED_BYTES, streams=streams)
     return clear, summed

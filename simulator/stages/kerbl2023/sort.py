@@ -177,15 +177,7 @@ def _pass_work(k: int, counts: NDArray[np.int64], starts: NDArray[np.int64], pai
 def pass_work(table: NDArray[np.int64], streams: tuple[Stream, ...] = (), variant: str = "") -> Work:
     """Work of one pass, from the rows of its blocks."""
     return Work(
-        stage="sort",
-        kernel="sort_onesweep",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        shared_bytes=SHARED_BYTES,
-        streams=streams,
-        variant=variant,
+        "sort", _E, table, BLOCK, kernel="sort_onesweep", shared_bytes=SHARED_BYTES, streams=streams, variant=variant
     )
 
 
@@ -209,12 +201,12 @@ def _histogram_work(pairs: int, key_bytes: int, used: NDArray[np.bool_], simt: S
     for event, count in adds.items():
         table[:, event] = count * table[:, _E.LISTED]
     return Work(
-        stage="sort",
+        "sort",
+        _E,
+        table,
+        HISTOGRAM_BLOCK,
         kernel="sort_histogram",
-        events=_E,
-        table=table,
         grid=blocks,
-        block=HISTOGRAM_BLOCK,
         shared_bytes=HISTOGRAM_SHARED_BYTES,
         streams=(Stream("keys", "load", key_bytes * pairs, key_bytes * pairs),),
         atomic_requests=sectors.ravel() * table[:, _E.LISTED].sum(),
@@ -230,11 +222,11 @@ def _sum_work(passes: int, simt: Simt) -> Work:
     table[:, [_E.LOAD_TRANSACTIONS, _E.STORE_TRANSACTIONS]] = moved // SECTOR_BYTES
     table[:, [_E.LOAD_BYTES, _E.STORE_BYTES]] = moved
     return Work(
-        stage="sort",
+        "sort",
+        _E,
+        table,
+        RADIX,
         kernel="sort_exclusive_sum",
-        events=_E,
-        table=table,
         grid=passes,
-        block=RADIX,
         streams=(Stream("digits", "load", passes * moved, passes * moved),),
     )

@@ -122,18 +122,10 @@ def tight_count(
 def tight_count_work(table: NDArray[np.int64], bound: str) -> Work:
     """Work of the kernel, from the rows of its blocks."""
     lanes, visible = (int(table[:, event].sum()) for event in (_E.LANES, _E.VISIBLE_LANES))
-    return Work(
-        stage="project",
-        kernel="tight_count",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        variant=bound,
-        streams=(
-            Stream("radii", "load", 4 * lanes, 4 * lanes),
-            Stream("positions", "load", 8 * visible, 8 * visible),
-            Stream("conics", "load", 16 * visible, 16 * visible),
-            Stream("tiles", "store", 4 * lanes, 4 * lanes, partial_lines=0),
-        ),
+    streams = (
+        Stream("radii", "load", 4 * lanes, 4 * lanes),
+        Stream("positions", "load", 8 * visible, 8 * visible),
+        Stream("conics", "load", 16 * visible, 16 * visible),
+        Stream("tiles", "store", 4 * lanes, 4 * lanes, partial_lines=0),
     )
+    return Work("project", _E, table, BLOCK, kernel="tight_count", variant=bound, streams=streams)

@@ -176,18 +176,18 @@ def _work(table: NDArray[np.int64], tiles: Tiles, count: int, warp: int) -> Work
     used = min(count, entries)
     span = (POSITION_BYTES + CONIC_BYTES + COLOUR_BYTES) * used  # neighbouring macro tiles list the same Gaussians
     sizes = (("positions", POSITION_BYTES), ("conics", CONIC_BYTES), ("colours", COLOUR_BYTES))
+    streams = (
+        Stream("values", "load", 2 * INDEX_BYTES * entries, INDEX_BYTES * entries),
+        *(Stream(name, "load", 32 * entries, size * used, span_bytes=span) for name, size in sizes),
+        Stream("partials", "store", int(table[:, _E.STORE_BYTES].sum()), written),
+    )
     return Work(
-        stage="blend",
+        "blend",
+        _E,
+        table,
+        WARPS * warp,
         kernel="blend_batches",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=WARPS * warp,
         shared_bytes=SHARED_BYTES,
         variant=f"tile {tiles.tile_x}x{tiles.tile_y}",
-        streams=(
-            Stream("values", "load", 2 * INDEX_BYTES * entries, INDEX_BYTES * entries),
-            *(Stream(name, "load", 32 * entries, size * used, span_bytes=span) for name, size in sizes),
-            Stream("partials", "store", int(table[:, _E.STORE_BYTES].sum()), written),
-        ),
+        streams=streams,
     )

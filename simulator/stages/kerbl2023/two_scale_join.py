@@ -122,15 +122,8 @@ def _work(table: NDArray[np.int64], tiles: Tiles, simt: Simt) -> Work:
     table[:, _E.LOAD_BYTES] = table[:, _E.LOAD_TRANSACTIONS] * segment
     table[:, _E.STORE_BYTES] = table[:, _E.STORE_TRANSACTIONS] * segment
     total = dict(zip(_E, table.sum(axis=0).tolist(), strict=True))
-    return Work(
-        stage="blend",
-        kernel="blend_partials",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=(
-            Stream("partials", "load", total[_E.LOAD_BYTES], size * total[_E.PARTIALS]),
-            Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * total[_E.PIXELS]),
-        ),
+    streams = (
+        Stream("partials", "load", total[_E.LOAD_BYTES], size * total[_E.PARTIALS]),
+        Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * total[_E.PIXELS]),
     )
+    return Work("blend", _E, table, BLOCK, kernel="blend_partials", streams=streams)

@@ -28,13 +28,12 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     depth_at,
     new_setup,
 )
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, keep_nearest
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest
 from tilestamp.simulator.stages.fatahalian2009.motion import BlurPattern, MovingMicropolygons, set_up_at
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import EVERYTHING, bound
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import warp_queue
 
 BATCH = 256  # polygons that a warp takes from the queue together
-WARPS = 4  # in a block
 SAMPLE_BYTES = (
     16  # of a visible sample: polygon, place, time and lens: written by the rasterizer, read here; counted here
 )
@@ -124,16 +123,8 @@ def decoupled_shading(
         Stream("visible", "store", moved, moved),
         Stream("colors", "store", colors, min(colors, COLOR_BYTES * count_)),
     )
-    work = Work(
-        stage="decoupled_shading",
-        kernel="decoupled_shading",
-        events=DecoupledEvent,
-        table=table,
-        grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
-        shared_bytes=WARPS * CELL_BYTES * shading.cache,
-        dispatch="warp_queue",
-        streams=streams,
+    work = warp_queue(
+        "decoupled_shading", DecoupledEvent, table, simt, shared_bytes=CELL_BYTES * shading.cache, streams=streams
     )
     return StageResult(made, (work,))
 

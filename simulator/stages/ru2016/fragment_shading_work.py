@@ -106,15 +106,7 @@ def shading_work(
         Stream("colors", "store", 12 * fragments, 12 * fragments),
     )
     kernel = f"fragment_shading_{texture_filter}"
-    return Work(
-        stage="fragment_shading",
-        kernel=kernel,
-        events=event,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=streams,
-    )
+    return Work("fragment_shading", event, table, BLOCK, kernel=kernel, streams=streams)
 
 
 def by_warp(pixels: NDArray[Any]) -> NDArray[Any]:

@@ -81,14 +81,7 @@ def occlusion_blur(light: NDArray[np.float32], simt: Simt) -> StageResult[NDArra
         Stream("fragments", "store", SECTOR_BYTES * stored, footprint),
     )
     work = Work(
-        stage="occlusion_blur",
-        kernel="occlusion_blur",
-        events=OcclusionBlurEvent,
-        table=table,
-        grid=blocks,
-        block=BLOCK,
-        shared_bytes=SHARED_BYTES,
-        streams=streams,
+        "occlusion_blur", OcclusionBlurEvent, table, BLOCK, grid=blocks, shared_bytes=SHARED_BYTES, streams=streams
     )
     return StageResult(out, (work,))
 

@@ -120,9 +120,8 @@ def per_primitive_raster(
         ),
     )
     work = Work(
-        stage="per_primitive_raster", kernel="per_primitive_raster", events=PerPrimitiveEvent, table=events,
-        grid=blocks, block=BLOCK, streams=streams, atomic_requests=requests,
-    )  # fmt: skip
+        "per_primitive_raster", PerPrimitiveEvent, events, BLOCK, grid=blocks, streams=streams, atomic_requests=requests
+    )
     return StageResult((Visible(visible, (depth / DEPTH_SCALE).astype(np.float32)), race), (work,))
 
 

@@ -109,9 +109,10 @@ def tile_lists(
     _add_primitive_loads(events, simt)
 
     def launched(kernel: str, table: NDArray[np.int64]) -> Work:
+        streams = _streams(table, len(drawable), tiles)
         return Work(
-            stage="tile_lists", kernel=kernel, events=TileListEvent, table=table, grid=blocks, block=BLOCK,
-            streams=_streams(table, len(drawable), tiles), atomic_requests=requests,
+            "tile_lists", TileListEvent, table, BLOCK, kernel=kernel, grid=blocks, streams=streams,
+            atomic_requests=requests,
         )  # fmt: skip
 
     filling = launched("tile_lists", events)

@@ -220,15 +220,7 @@ def tiled_raster(
 
 def raster_work(table: NDArray[np.int64], tile: int, streams: tuple[Stream, ...] = ()) -> Work:
     """Work of the kernel, a row and a block a tile, a thread a pixel."""
-    return Work(
-        stage="tiled_raster",
-        kernel="tiled_raster",
-        events=TiledRasterEvent,
-        table=table,
-        grid=len(table),
-        block=tile * tile,
-        streams=streams,
-    )
+    return Work("tiled_raster", TiledRasterEvent, table, tile * tile, streams=streams)
 
 
 def _add_traffic(events: NDArray[np.int64], simt: Simt, tile: int) -> None:

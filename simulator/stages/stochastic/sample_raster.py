@@ -143,12 +143,10 @@ def raster_launch(
 ) -> Work:
     """A block a tile, a thread a pixel."""
     return Work(
-        stage="sample_raster",
-        kernel="sample_raster",
-        events=SampleRasterEvent,
-        table=events,
-        grid=len(events),
-        block=tile * tile,
+        "sample_raster",
+        SampleRasterEvent,
+        events,
+        tile * tile,
         shared_bytes=tile * tile * spp * SAMPLE_BYTES,
         streams=streams,
         variant=variant,

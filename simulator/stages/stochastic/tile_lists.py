@@ -120,12 +120,10 @@ def _works(
     )
     counters = Stream("tile_counters", "atomic", 32 * asked, COUNTER_BYTES * tiles)
     filling = Work(
-        stage="moving_lists",
-        kernel="moving_lists",
-        events=MovingListEvent,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
+        "moving_lists",
+        MovingListEvent,
+        table,
+        BLOCK,
         streams=(Stream("triangles", "load", loaded, footprint), counters),
         atomic_requests=requests,
     )

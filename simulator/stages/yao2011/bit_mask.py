@@ -22,25 +22,22 @@ from tilestamp.models.coalescing import contiguous
 from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
-    blocks,
     count_hits,
     keep_nearest,
     pixel_box,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.stages.yao2011.bit_mask_words import new_mask, next_word, patch_box
-from tilestamp.simulator.work import Work
 
 MaskKind = Literal["plain", "facing", "depth"]
 KINDS: tuple[MaskKind, ...] = get_args(MaskKind)
-WARPS = 4  # in a block
 SHARED_WORDS = 512  # mask words of a warp in shared memory; larger masks lie in global memory
 LANE = 8  # columns of a lane's walk: x0, y0, x1, y1 in pixels, row, next word, pending bits, mask layer
 
@@ -98,25 +95,13 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     starts = np.flatnonzero(np.diff(polygons.patch, prepend=-1, append=np.iinfo(np.int32).max))
     table = np.zeros((len(starts) - 1, len(BitMaskEvent)), np.int64)
     _bit_mask(polygons.vertices, starts, samples, KINDS.index(kind), lanes, simt, table)
-    streams = (
-        Stream("micropolygons", "load", int(table[:, BitMaskEvent.LOAD_BYTES].sum()), polygons.vertices.nbytes),
-        Stream(
-            "samples",
-            "atomic",
-            int(table[:, BitMaskEvent.ATOMIC_REQUESTS].sum()) * 32,
-            int(np.count_nonzero(samples.requests)) * 32,
-        ),
-    )
-    grid, block, shared = blocks(simt, WARPS), WARPS * simt.warp, SHARED_WORDS * 4 * WARPS
-    work = Work(
-        stage="bit_mask",
-        kernel="bit_mask",
-        events=BitMaskEvent,
-        table=table,
-        grid=grid,
-        block=block,
-        shared_bytes=shared,
-        dispatch="warp_queue",
+    streams = sample_streams(polygons.vertices.nbytes, samples, BitMaskEvent, table)
+    work = warp_queue(
+        "bit_mask",
+        BitMaskEvent,
+        table,
+        simt,
+        shared_bytes=SHARED_WORDS * 4,
         streams=streams,
         atomic_requests=samples.requests,
     )

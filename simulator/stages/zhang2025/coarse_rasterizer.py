@@ -148,12 +148,11 @@ def coarse_rasterizer(
 def coarse_work(events: NDArray[np.int64], streams: tuple[Stream, ...] = (), *, unrolled: bool) -> Work:
     """Launch of the stage."""
     return Work(
-        stage="CoarseRasterizer",
+        "CoarseRasterizer",
+        CoarseRasterizerEvent,
+        events,
+        BLOCK,
         kernel="CoarseRasterizer" if unrolled else "CoarseRasterizer_before",
-        events=CoarseRasterizerEvent,
-        table=events,
-        grid=len(events),
-        block=BLOCK,
         shared_bytes=SHARED_BYTES,
         streams=streams,
     )

@@ -124,14 +124,7 @@ def fine_rasterizer(
     kernel = "FineRasterizer" if optimized else "FineRasterizer_before"
     shared = group * 4 * (64 + 64 + 4 + 4 + 1)
     work = Work(
-        stage="FineRasterizer",
-        kernel=kernel,
-        events=FineRasterizerEvent,
-        table=table,
-        grid=len(table),
-        block=32 * group,
-        shared_bytes=shared,
-        streams=streams,
+        "FineRasterizer", FineRasterizerEvent, table, 32 * group, kernel=kernel, shared_bytes=shared, streams=streams
     )
     return StageResult(out, (work,))
 

@@ -204,12 +204,12 @@ def pixel_shader(
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     work = Work(
-        stage="PixelShader",
+        "PixelShader",
+        PixelShaderEvent,
+        events,
+        BLOCK,
         kernel=kernel,
-        events=PixelShaderEvent,
-        table=events,
         grid=blocks,
-        block=BLOCK,
         streams=streams,
         variant="" if derivatives == "quads" else derivatives,
     )

@@ -203,13 +203,5 @@ def primitive_assembly(
         Stream("primitives", "store", int(stores.sum()) * segment, used * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveAssembly"
-    work = Work(
-        stage=stage,
-        kernel=stage,
-        events=PrimitiveAssemblyEvent,
-        table=events,
-        grid=blocks,
-        block=BLOCK,
-        streams=streams,
-    )
+    work = Work(stage, PrimitiveAssemblyEvent, events, BLOCK, grid=blocks, streams=streams)
     return StageResult(Primitives(out.screen[:used], out.varyings[:used], out.ids[:used]), (work,))

@@ -173,16 +173,7 @@ def primitive_binning(
         ),
     )
     stage = "PrimitiveBinning"
-    work = Work(
-        stage=stage,
-        kernel=stage,
-        events=PrimitiveBinningEvent,
-        table=events,
-        grid=blocks,
-        block=BLOCK,
-        shared_bytes=SHARED_BYTES,
-        streams=streams,
-    )
+    work = Work(stage, PrimitiveBinningEvent, events, BLOCK, grid=blocks, shared_bytes=SHARED_BYTES, streams=streams)
     return StageResult(BinQueues(starts, entries), (work,))
 
 

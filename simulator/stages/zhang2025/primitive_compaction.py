@@ -83,15 +83,7 @@ def primitive_compaction(slots: Primitives, triangles: int, simt: Simt) -> Stage
         Stream("compacted", "store", int(words.sum()) * segment, len(kept) * PRIMITIVE_BYTES),
     )
     stage = "PrimitiveCompaction"
-    work = Work(
-        stage=stage,
-        kernel=stage,
-        events=PrimitiveCompactionEvent,
-        table=events,
-        grid=blocks,
-        block=BLOCK,
-        streams=streams,
-    )
+    work = Work(stage, PrimitiveCompactionEvent, events, BLOCK, grid=blocks, streams=streams)
     return StageResult(Primitives(slots.screen[kept], slots.varyings[kept], slots.ids[kept]), (work,))
 
 

@@ -133,16 +133,7 @@ def rop(
         Stream("depth", "store", 4 * pixels, 4 * pixels, partial_lines=halves),
     )
     kernel, shared = ("ROP", 2 * 4 * KEPT * 256) if optimized else ("ROP_before", 0)
-    work = Work(
-        stage="ROP",
-        kernel=kernel,
-        events=RopEvent,
-        table=events,
-        grid=len(events),
-        block=BLOCK_SIDE**2,
-        shared_bytes=shared,
-        streams=streams,
-    )
+    work = Work("ROP", RopEvent, events, BLOCK_SIDE**2, kernel=kernel, shared_bytes=shared, streams=streams)
     return StageResult(out, (work,))
 
 
