@@ -25,7 +25,7 @@ from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
 from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import DiceEvent
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles
-from tilestamp.simulator.stages.eisenacher2010.tile_raster import Pixels, raster_grid, raster_streams, shared_bytes
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import Pixels, raster_streams, shared_bytes
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     SEGMENT_WORDS,
     WORD_BYTES,
@@ -38,8 +38,9 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     grids_together,
     shape_for,
 )
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_quads import new_quads, raster_grids
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, FAR, Samples
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, FAR, Samples, new_tests
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
@@ -118,7 +119,7 @@ def _farthest(samples: Samples, width: int, height: int) -> Any:
 
 @kernel
 def _raster_tiles(
-    part: int, parts: int, vertices: Any, colors: Any, nearest: Any, count: Any, start: Any, lists: Any, tiles: Tiles,
+    part: int, parts: int, points: Any, words: Any, nearest: Any, count: Any, start: Any, lists: Any, tiles: Tiles,
     shape: BlockShape, traffic: Any, by_depth: bool, kept: Any, image: Any, depth: Any, overdraw: Any, table: Any,
 ) -> None:  # fmt: skip
     """One part of the tiles."""
@@ -126,6 +127,7 @@ def _raster_tiles(
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
+    quads, tests = new_quads(shape.grid), new_tests()
     addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     members, drawn = np.empty(count.max(), np.uint32), np.empty(count.max(), np.uint32)
     depths = np.empty(count.max(), np.float32)
@@ -133,6 +135,7 @@ def _raster_tiles(
     for block in range(count.size * part // parts, count.size * (part + 1) // parts):
         first, number, row = np.int64(start[block]), np.int64(count[block]), table[block]
         x, y = block % tiles.columns * size, block // tiles.columns * size
+        origin = (np.float64(x), np.float64(y))
         samples.depth[:] = FAR
         samples.color[:] = BACKGROUND
         samples.hits[:] = 0
@@ -147,7 +150,7 @@ def _raster_tiles(
                 if by_depth and k >= (number - 1) // SORTED_TOGETHER * SORTED_TOGETHER:
                     break  # all others of the last piece are farther
                 continue
-            raster_grid(vertices, colors, None, members[k], (np.float64(x), np.float64(y)), shape, samples, row)
+            raster_grids(points, words, None, members, k, k + 1, origin, shape, samples, quads, tests, row)
             drawn[taken] = kept[first + taken] = members[k]
             taken += 1
             if taken % batch == 0:
@@ -209,10 +212,10 @@ def culled_raster(
     image, depth = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
     overdraw, table = np.empty((height, width), np.int32), np.zeros((tiles.total, len(CulledRasterEvent)), np.int64)
     kept = np.full(len(lists), NONE, np.uint32)
-    nearest, colors = vertices[:, :, 2].min(axis=1), vertices.view(np.uint32)[:, :, 3]
+    nearest, points = vertices[:, :, 2].min(axis=1), vertices.reshape(-1, 4)
     for_parts(
-        _raster_tiles, parts_of(tiles.total, _PART_TILES), vertices, colors, nearest, count, start, lists, tiles, shape,
-        block_traffic(shape, simt), by_depth, kept, image, depth, overdraw, table,
+        _raster_tiles, parts_of(tiles.total, _PART_TILES), points, points.view(np.uint32), nearest, count, start, lists,
+        tiles, shape, block_traffic(shape, simt), by_depth, kept, image, depth, overdraw, table,
     )  # fmt: skip
     return StageResult(
         Pixels(image, depth, overdraw), (_work(table, len(vertices), kept[kept != NONE], tiles, shape, simt, by_depth),)

@@ -20,7 +20,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, tile_range
-from tilestamp.simulator.stages.eisenacher2010.tile_raster import Pixels, raster_grid, raster_streams, shared_bytes
+from tilestamp.simulator.stages.eisenacher2010.tile_raster import Pixels, raster_streams, shared_bytes
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     BROADCAST_LOADS,
     SEGMENT_WORDS,
@@ -35,8 +35,16 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     grids_together,
     shape_for,
 )
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_quads import Quads, new_quads, raster_grids
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, FAR, QUADS, Samples
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
+    BACKGROUND,
+    FAR,
+    QUADS,
+    Samples,
+    Tests,
+    new_tests,
+)
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
@@ -61,8 +69,9 @@ _M = MacroRasterEvent
 
 @kernel(lent=True)
 def _draw_fine(
-    column: int, line: int, first: int, grids: int, batch: int, vertices: Any, colors: Any, boxes: Any, lists: Any,
-    fine: Tiles, shape: BlockShape, samples: Samples, walked: Any, passes: Any, row: Any,
+    column: int, line: int, first: int, grids: int, batch: int, points: Any, words: Any, boxes: Any, lists: Any,
+    fine: Tiles, shape: BlockShape, samples: Samples, quads: Quads, tests: Tests,
+    walked: Any, passes: Any, row: Any,
 ) -> None:  # fmt: skip
     """One fine tile: the grids whose box is in it; by batch how many those are, and their quads that go on."""
     origin = (np.float64(column * shape.tile), np.float64(line * shape.tile))
@@ -74,14 +83,14 @@ def _draw_fine(
         if column < x0 or column > x1 or line < y0 or line > y1:
             continue
         before = row[_E.SUBTILE_PASS]
-        raster_grid(vertices, colors, None, lists[first + k], origin, shape, samples, row)
+        raster_grids(points, words, None, lists, first + k, first + k + 1, origin, shape, samples, quads, tests, row)
         walked[k // batch] += 1
         passes[k // batch] += row[_E.SUBTILE_PASS] - before
 
 
 @kernel
 def _raster_tiles(
-    part: int, parts: int, vertices: Any, colors: Any, boxes: Any, count: Any, start: Any, lists: Any, coarse: Tiles,
+    part: int, parts: int, points: Any, words: Any, boxes: Any, count: Any, start: Any, lists: Any, coarse: Tiles,
     fine: Tiles, large: BlockShape, shape: BlockShape, traffic: Any, image: Any, depth: Any, overdraw: Any, table: Any,
 ) -> None:  # fmt: skip
     """One part of the coarse tiles."""
@@ -89,6 +98,7 @@ def _raster_tiles(
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
+    quads, tests = new_quads(shape.grid), new_tests()
     addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     in_turn = max(1, shape.warp // (size * size))  # fine tiles of one warp
     most = 1 + np.int64(count.max()) // batch
@@ -114,13 +124,15 @@ def _raster_tiles(
                 first,
                 grids,
                 batch,
-                vertices,
-                colors,
+                points,
+                words,
                 boxes,
                 lists,
                 fine,
                 shape,
                 samples,
+                quads,
+                tests,
                 walked,
                 passes,
                 row,
@@ -204,10 +216,10 @@ def macro_raster(
     large, shape = (shape_for(vertices, tiles, simt, **rules) for tiles in (coarse, fine))
     image, depth = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
     overdraw, table = np.empty((height, width), np.int32), np.zeros((coarse.total, len(MacroRasterEvent)), np.int64)
-    colors, traffic = vertices.view(np.uint32)[:, :, 3], block_traffic(large, simt)
+    points, traffic = vertices.reshape(-1, 4), block_traffic(large, simt)
     for_parts(
-        _raster_tiles, parts_of(coarse.total, _PART_TILES), vertices, colors, boxes, count, start, lists, coarse, fine,
-        large, shape, traffic, image, depth, overdraw, table,
+        _raster_tiles, parts_of(coarse.total, _PART_TILES), points, points.view(np.uint32), boxes, count, start, lists,
+        coarse, fine, large, shape, traffic, image, depth, overdraw, table,
     )  # fmt: skip
     return StageResult(Pixels(image, depth, overdraw), (_work(table, vertices, lists, coarse, large, shape, simt),))
 

@@ -24,14 +24,21 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.dice import Grids, dice
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import BlockShape, block_shape
-from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import BACKGROUND, Samples, sample_quad
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
+    BACKGROUND,
+    COLUMN,
+    MOST_TESTS,
+    add_tests,
+    color_of,
+    new_tests,
+    run_tests,
+)
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
 from tilestamp.simulator.work import Work
 
 BLOCK = 256  # threads, a pixel or a grid each
 STAGE = "shade_visible"
 WORD_BYTES, VECTOR_BYTES = 4, 16
-FAR = np.float32(np.inf)
 
 
 @shown(count("SEEN_LANES", "pixels that see a quad"))
@@ -52,23 +59,23 @@ _E = PixelEvent
 
 
 @kernel
-def _blend(
-    part: int, parts: int, ids: Any, vertices: Any, colors: Any, shape: BlockShape, vertices_a_grid: int, image: Any
-) -> None:
+def _blend(part: int, parts: int, ids: Any, points: Any, words: Any, shape: BlockShape, image: Any) -> None:
     """Colours of the pixels of some rows: each quad is evaluated again at the one sample that sees it."""
-    sample = Samples(np.empty((1, 1), np.float32), np.empty((1, 1), np.uint32), np.zeros((1, 1), np.int32))
     height, width = ids.shape
+    tests, below = new_tests(), np.uint64(shape.grid)
     for y in range(height * part // parts, height * (part + 1) // parts):
-        for x in range(width):
-            sample.depth[0, 0] = FAR
-            sample.color[0, 0] = BACKGROUND
-            first = np.int64(ids[y, x])
-            if ids[y, x] != BACKGROUND:
-                grid, v = first // vertices_a_grid, first % vertices_a_grid
-                place = (np.float64(x), np.float64(y))
-                sample_quad(vertices, colors, None, grid, v, (0, 0, 0, 0), place, shape, sample, None)
-            for channel in range(3):
-                image[y, x, channel] = (sample.color[0, 0] >> np.uint32(8 * channel)) & np.uint32(255)
+        for first in range(0, width, MOST_TESTS):
+            number = 0
+            for x in range(first, min(first + MOST_TESTS, width)):
+                if ids[y, x] != BACKGROUND:
+                    number = add_tests(tests, number, points, np.uint64(ids[y, x]), below, (x, x, 0, 0))
+                for channel in range(3):
+                    image[y, x, channel] = (BACKGROUND >> np.uint32(8 * channel)) & np.uint32(255)
+            run_tests(tests, number, None, (0, y), shape)
+            for k in range(number):
+                color, x = color_of(tests, k, words, below), int(tests.rows[COLUMN + k])
+                for channel in range(3):
+                    image[y, x, channel] = (color >> np.uint32(8 * channel)) & np.uint32(255)
 
 
 @kernel
@@ -167,8 +174,8 @@ def shade_visible(
     vertices = grids.vertices.copy()
     vertices[kept, :, 3] = shaded.vertices[:, :, 3]
     image = np.empty((height, width, 3), np.uint8)
-    shape, colors = block_shape(8, 1, simt, box_tests=True, loaded=False, grid=side), vertices.view(np.uint32)[:, :, 3]
-    for_parts(_blend, parts_of(height), ids, vertices, colors, shape, side**2, image)
+    shape, points = block_shape(8, 1, simt, box_tests=True, loaded=False, grid=side), vertices.reshape(-1, 4)
+    for_parts(_blend, parts_of(height), ids, points, points.view(np.uint32), shape, image)
     works = (
         pixel_work("mark_grids", ids, side, np.array([0]), len(marks), simt),
         *_renamed(scan),

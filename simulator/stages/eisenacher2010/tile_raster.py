@@ -31,20 +31,18 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import (
     BlockShape,
     TileRasterEvent,
     block_traffic,
-    box_warps,
     count_block,
     count_stores,
     grids_together,
     shape_for,
 )
+from tilestamp.simulator.stages.eisenacher2010.tile_raster_quads import new_quads, raster_grids
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_resolve import resolve
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
     FAR,
     Samples,
-    quad_box,
-    sample_quad,
-    sample_span,
+    new_tests,
 )
 from tilestamp.simulator.work import Work
 
@@ -55,49 +53,12 @@ SMALLEST_WARP = 16  # lanes: 16 load a grid together
 _E = TileRasterEvent
 
 
-@kernel(lent=True)
-def raster_grid(
-    vertices: Any, colors: Any, stored: Any, grid: int, origin: Any, shape: BlockShape, samples: Any, row: Any
-) -> None:
-    """One grid in one tile: for each quad the sub-tiles that its box touches, and in each the samples in the box."""
-    tile, side, size = shape.tile, shape.side, shape.subtile
-    left, top = origin
-    quads, v, column = shape.grid - 1, -1, 0  # quads a row; the first vertex of the quad, its column
-    for _ in range(quads * quads):
-        v += 1 + (column == quads)
-        column = 1 if column == quads else column + 1
-        x0, y0, x1, y1 = quad_box(vertices, grid, v, shape.grid)
-        if x1 < left or x0 > left + tile or y1 < top or y0 > top + tile:
-            continue
-        i0, i1 = sample_span(x0, x1, left, side, tile * side)
-        j0, j1 = sample_span(y0, y1, top, side, tile * side)
-        for sub in range(side * side):
-            i, j = sub & (side - 1), sub >> shape.side_bits
-            if x1 < left + i * size or x0 > left + (i + 1) * size or y1 < top + j * size or y0 > top + (j + 1) * size:
-                continue
-            span = (max(i0, i * tile), min(i1, i * tile + tile - 1), max(j0, j * tile), min(j1, j * tile + tile - 1))
-            columns, rows = span[1] - span[0] + 1, span[3] - span[2] + 1
-            inside = columns > 0 and rows > 0
-            if row is not None and shape.box_tests:
-                row[_E.SUBTILE_PASS] += 1
-                if inside:
-                    row[_E.BOX_WARPS] += box_warps(span, shape)
-                    row[_E.BOX_LANES] += columns * rows
-            if inside:
-                counts = sample_quad(vertices, colors, stored, grid, v, span, origin, shape, samples, row)
-                if row is not None:
-                    row[_E.HIT_WARPS] += counts[0]
-                    row[_E.HIT_LANES] += counts[1]
-                    row[_E.Z_WARPS] += counts[2]
-                    row[_E.Z_LANES] += counts[3]
-
-
 @kernel
 def _raster_tiles(
     part: int,
     parts: int,
-    vertices: Any,
-    colors: Any,
+    points: Any,
+    words: Any,
     stored: Any,
     count: Any,
     start: Any,
@@ -116,6 +77,7 @@ def _raster_tiles(
     samples = Samples(
         np.empty((size, size), np.float32), np.empty((size, size), np.uint32), np.zeros((size, size), np.int32)
     )
+    quads, tests = new_quads(shape.grid), new_tests()
     addresses, stores = np.empty(shape.warp, np.int64), np.zeros((SEGMENT_WORDS, 2), np.int64)
     height, width = depth.shape
     for block in range(count.size * part // parts, count.size * (part + 1) // parts):
@@ -126,8 +88,7 @@ def _raster_tiles(
         samples.depth[:] = FAR
         samples.color[:] = BACKGROUND
         samples.hits[:] = 0
-        for k in range(first, first + grids):
-            raster_grid(vertices, colors, stored, lists[k], origin, shape, samples, row)
+        raster_grids(points, words, stored, lists, first, first + grids, origin, shape, samples, quads, tests, row)
         resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
         if ids is not None:
             y, x = tile_row * shape.tile, column * shape.tile
@@ -261,12 +222,13 @@ def tile_raster(
     overdraw = np.empty((height, width), np.int32) if counting else None
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
-    colors = None if ids else vertices.view(np.uint32)[:, :, 3]
+    points = vertices.reshape(-1, 4)
+    words = None if ids else points.view(np.uint32)
     stored = stored_edges(vertices, edges) if edges in {"half", "fixed"} else None
     seen = np.full((height, width), BACKGROUND, np.uint32) if ids else None
     buffers = (image, depth, overdraw, seen, table)
     parts = parts_of(tiles.total, _PART_TILES)
-    for_parts(_raster_tiles, parts, vertices, colors, stored, count, start, lists, tiles, shape, traffic, *buffers)
+    for_parts(_raster_tiles, parts, points, words, stored, count, start, lists, tiles, shape, traffic, *buffers)
     pixels = Pixels(image if seen is None else seen, depth, overdraw)
     if table is None:
         return StageResult(pixels)

@@ -18,25 +18,33 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import Sample
 def resolve(samples: Samples, side: int, x0: int, y0: int, image: Any, depth: Any, overdraw: Any) -> None:
     """Write the pixels of one tile that lie on the screen: mean colour, rounded; nearest depth; hits of all samples."""
     height, width = depth.shape
-    count = np.uint32(side * side)
     for y in range(y0, min(y0 + samples.depth.shape[0] // side, height)):
         for x in range(x0, min(x0 + samples.depth.shape[1] // side, width)):
-            nearest = samples.depth[(y - y0) * side, (x - x0) * side]
-            red = green = blue = hits = 0
-            for j in range((y - y0) * side, (y - y0 + 1) * side):
-                for i in range((x - x0) * side, (x - x0 + 1) * side):
-                    color = samples.color[j, i]
-                    red += color & 255
-                    green += (color >> 8) & 255
-                    blue += (color >> 16) & 255
-                    nearest = min(nearest, samples.depth[j, i])
-                    hits += samples.hits[j, i]
-            image[y, x, 0] = (red + count // 2) // count
-            image[y, x, 1] = (green + count // 2) // count
-            image[y, x, 2] = (blue + count // 2) // count
+            j, i = (y - y0) * side, (x - x0) * side
+            color, nearest, hits = samples.color[j, i], samples.depth[j, i], samples.hits[j, i]
+            if side > 1:
+                color, nearest, hits = _mean(samples, side, j, i)
+            image[y, x, 0], image[y, x, 1], image[y, x, 2] = color & 255, (color >> 8) & 255, (color >> 16) & 255
             depth[y, x] = nearest
             if overdraw is not None:
                 overdraw[y, x] = hits
+
+
+@kernel(lent=True)
+def _mean(samples: Samples, side: int, first_row: int, first_column: int) -> tuple[Any, Any, Any]:
+    """Mean colour, nearest depth and hits of the samples of a pixel."""
+    bits, nearest = 2 * (side >> 1), samples.depth[first_row, first_column]  # their number is 1 << bits
+    red = green = blue = (side * side) >> 1
+    hits = np.int32(0)
+    for j in range(first_row, first_row + side):
+        for i in range(first_column, first_column + side):
+            color = samples.color[j, i]
+            red += color & 255
+            green += (color >> 8) & 255
+            blue += (color >> 16) & 255
+            nearest = min(nearest, samples.depth[j, i])
+            hits += samples.hits[j, i]
+    return np.uint32(red >> bits | green >> bits << 8 | blue >> bits << 16), nearest, np.int32(hits)
 
 
 @kernel
