@@ -29,7 +29,7 @@ def new_setup() -> tuple[Any, Any, Any, Any]:
     )
 
 
-@kernel
+@kernel(lent=True)
 def set_up(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -> Any:
     """Set a polygon up: edge functions a x + b y + c >= 0 inside, boxes, depths; returns twice its signed area.
 
@@ -45,7 +45,7 @@ def set_up(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -> A
     return set_edges(polygon, edges, boxes, depths, snapped)
 
 
-@kernel
+@kernel(lent=True)
 def snap(polygon: Any, boxes: Any, snapped: Any) -> None:
     """Snap the vertices to the sub-pixel grid and fill the polygon's own box: all that choosing stamps needs."""
     for d in range(2):
@@ -61,7 +61,7 @@ def snap(polygon: Any, boxes: Any, snapped: Any) -> None:
         boxes[0, 2 + d] = high
 
 
-@kernel
+@kernel(lent=True)
 def set_edges(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -> Any:
     """Set up edges and depths of snapped vertices; returns twice the signed area."""
     area = _triangle(snapped, 1, 2, 0, edges, boxes)
@@ -75,7 +75,7 @@ def set_edges(polygon: Any, edges: Any, boxes: Any, depths: Any, snapped: Any) -
     return area
 
 
-@kernel
+@kernel(lent=True)
 def _triangle(snapped: Any, j: int, k: int, t: int, edges: Any, boxes: Any) -> Any:
     """Edges 0-j, j-k, k-0 of triangle t, turned so that the inside is positive; returns twice the signed area."""
     xi, yi, xj, yj, xk, yk = (
@@ -92,7 +92,7 @@ def _triangle(snapped: Any, j: int, k: int, t: int, edges: Any, boxes: Any) -> A
     return area
 
 
-@kernel
+@kernel(lent=True)
 def _edge(x0: int, y0: int, x1: int, y1: int, sign: int, edges: Any, row: int) -> None:
     """One edge function; a triangle without area (sign 0) owns nothing and so covers nothing."""
     a = sign * (y0 - y1)
@@ -103,7 +103,7 @@ def _edge(x0: int, y0: int, x1: int, y1: int, sign: int, edges: Any, row: int) -
     edges[row, 3] = rule if sign != 0 else 0
 
 
-@kernel
+@kernel(lent=True)
 def covering_triangle(edges: Any, x: int, y: int) -> int:
     """Triangle of the polygon (0 or 1) that covers the sample, -1 if none does: one sample test."""
     for first in range(0, EDGE_ROWS, 3):
@@ -116,7 +116,7 @@ def covering_triangle(edges: Any, x: int, y: int) -> int:
     return -1
 
 
-@kernel
+@kernel(lent=True)
 def depth_at(edges: Any, depths: Any, triangle: int, x: int, y: int) -> Any:
     """Depth of a triangle at a sample that it covers: barycentric, float64, rounded once to float32."""
     first = 3 * triangle
@@ -127,13 +127,13 @@ def depth_at(edges: Any, depths: Any, triangle: int, x: int, y: int) -> Any:
     return np.float32(weighted / (at_0 + at_1 + at_2))
 
 
-@kernel
+@kernel(lent=True)
 def _value(edges: Any, row: int, x: int, y: int) -> Any:
     """Evaluate an edge function without the top-left rule."""
     return edges[row, 0] * x + edges[row, 1] * y + edges[row, 2] + edges[row, 3]
 
 
-@kernel
+@kernel(lent=True)
 def touches(edges: Any, boxes: Any, corners: Any, x0: int, y0: int, x1: int, y1: int) -> bool:
     """Whether the polygon reaches into the square from (x0, y0) up to, not including, (x1, y1)."""
     for triangle in range(corners - 2):
@@ -152,7 +152,7 @@ def touches(edges: Any, boxes: Any, corners: Any, x0: int, y0: int, x1: int, y1:
     return False
 
 
-@kernel
+@kernel(lent=True)
 def fills(edges: Any, corners: Any, x0: int, y0: int, x1: int, y1: int) -> bool:
     """Whether one triangle of the polygon covers all of the square: every sample in it is hit, without a test."""
     for triangle in range(corners - 2):

@@ -4,19 +4,24 @@ A hit is one atomic minimum of depth and polygon in one 64-bit word; ties go to 
 picture does not depend on the order of arrival.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import get_num_threads
 from numpy.typing import NDArray
 
 from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 
 WORD_BYTES = 8  # depth and polygon
 BACKGROUND = 255
+MOST_COPIES = 8  # of the sample buffers, one for each part that draws beside others
+UNITS = 16  # of work, one after another, that a part draws before it leaves as many to each other part
 
 
 class Samples(NamedTuple):
@@ -60,7 +65,42 @@ def new_samples(width: int, height: int, offsets: NDArray[np.int64]) -> Samples:
     )
 
 
+def draw_in_parts(draw: Callable[..., Any], units: int, samples: Samples, *args: Any) -> None:
+    """Call ``draw(part, parts, samples, *args)`` side by side, for its share of the units (``units_of``).
+
+    Each part draws into sample buffers of its own. The nearest of all stays in ``samples``, tests and requests are
+    added up: the order of polygons makes no difference to either.
+    """
+    parts = max(1, min(-(-units // UNITS), get_num_threads(), MOST_COPIES))
+    copies = [samples, *(new_samples(samples.width, samples.height, samples.offsets) for _ in range(parts - 1))]
+    for_parts(lambda part, parts: draw(part, parts, copies[part], *args), parts)
+    for copy in copies[1:]:
+        for_parts(_merge, parts_of(samples.height, 16), copy, samples)
+
+
 @kernel
+def units_of(part: int, parts: int, units: int) -> Any:
+    """Units that a part draws: all parts have some of every region."""
+    every = np.arange(units)
+    return every[every // UNITS % parts == part]
+
+
+@kernel
+def _merge(part: int, parts: int, copy: Samples, samples: Samples) -> None:
+    """Take into a share of the samples what a copy of them has."""
+    rows, wide = samples.height, samples.width * len(samples.offsets)
+    for at in range(rows * part // parts * wide, rows * (part + 1) // parts * wide):
+        depth, polygon = copy.depth[at], copy.polygon[at]
+        if depth < samples.depth[at] or (depth == samples.depth[at] and polygon < samples.polygon[at]):
+            samples.depth[at], samples.polygon[at] = depth, polygon
+    for y in range(rows * part // parts, rows * (part + 1) // parts):
+        samples.tests[y] += copy.tests[y]
+    chunks = len(samples.requests)
+    for i in range(chunks * part // parts, chunks * (part + 1) // parts):
+        samples.requests[i] += copy.requests[i]
+
+
+@kernel(lent=True)
 def keep_nearest(samples: Samples, x: int, y: int, s: int, depth: Any, polygon: int) -> Any:
     """Atomic minimum of one hit; returns the byte address it went to."""
     at = (y * samples.width + x) * len(samples.offsets) + s
@@ -70,7 +110,7 @@ def keep_nearest(samples: Samples, x: int, y: int, s: int, depth: Any, polygon: 
     return at * WORD_BYTES
 
 
-@kernel
+@kernel(lent=True)
 def count_hits(samples: Samples, addresses: Any, hits: int, merge: int) -> Any:
     """Count one warp's atomic instruction: lanes, requests, conflicts, depth.
 
@@ -81,7 +121,7 @@ def count_hits(samples: Samples, addresses: Any, hits: int, merge: int) -> Any:
     return counts
 
 
-@kernel
+@kernel(lent=True)
 def on_screen(boxes: Any, width: int, height: int) -> tuple[int, int, int, int]:
     """Clip a polygon's box to the screen: x0, y0, x1, y1 in sub-pixel steps; x1 < x0 or y1 < y0 if nothing is left."""
     return (
@@ -92,7 +132,7 @@ def on_screen(boxes: Any, width: int, height: int) -> tuple[int, int, int, int]:
     )
 
 
-@kernel
+@kernel(lent=True)
 def pixel_box(boxes: Any, width: int, height: int) -> tuple[int, int, int, int]:
     """First and last pixel (x0, y0, x1, y1) of a polygon's box, on screen; empty if x1 < x0 or y1 < y0."""
     x0, y0, x1, y1 = on_screen(boxes, width, height)

@@ -7,12 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.scenes import catmull_clark
 from tilestamp.simulator.scenes.scene import Mesh, Patches, Scene
+from tilestamp.simulator.stages.laine2011.exact import fma64
 
 GUARD_PIXELS = 1 << 17  # beyond it the sub-pixel arithmetic would not fit 64 bits
 NEAR = 1e-6  # least w: polygons that cross the eye's plane are dropped, and counted
-LIGHT = np.array([0.36, 0.48, 0.8])  # unit vector towards the light, model space
+LIGHT = (0.36, 0.48, 0.8)  # unit vector towards the light, model space
 MOST_RATE = 256  # micropolygons along the side of a patch
 
 
@@ -52,7 +54,11 @@ def from_patches(
     patches: Patches, matrix: ArrayLike, width: int, height: int, size: float = 1.0, triangles: bool = False
 ) -> Micropolygons:
     """Dice each patch evenly, so that its longest control polygon is cut to pieces of at most ``size`` pixels."""
-    return _on_screen(*diced(patches, matrix, width, height, size), matrix, width, height, triangles)
+    points, matrix = patches.points.astype(np.float64), np.asarray(matrix, np.float64)
+    rates, ends = _rates(points, matrix, width, height, size)
+    made = _room(int(ends[-1]) if len(ends) else 0, 4)
+    for_parts(_dice, parts_of(len(rates)), points, rates, ends, matrix, width, height, *made)
+    return _drawable(*made, np.repeat(np.arange(len(rates), dtype=np.int32), rates**2), triangles)
 
 
 def diced(
@@ -60,10 +66,9 @@ def diced(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Corners of a patch's micropolygons in its own space, (M, 4, 4), and the patch of each."""
     points = patches.points.astype(np.float64)
-    rates = _rates(project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 16, 3), size)
-    ends = np.cumsum(rates**2)
+    rates, ends = _rates(points, np.asarray(matrix, np.float64), width, height, size)
     polygons = np.empty((int(ends[-1]) if len(ends) else 0, 4, 4))
-    _evaluate(points, rates, ends, polygons)
+    for_parts(_evaluate, parts_of(len(rates)), points, rates, ends, polygons)
     return polygons, np.repeat(np.arange(len(rates)), rates**2)
 
 
@@ -93,12 +98,26 @@ def _on_screen(
     height: int, triangles: bool,
 ) -> Micropolygons:  # fmt: skip
     """Project, shade, and leave out what cannot be drawn."""
-    corners = polygons.shape[1]
-    screen, usable = project(polygons.reshape(-1, 4), matrix, width, height)
-    kept = usable.reshape(-1, corners).all(axis=1)
-    vertices = screen.reshape(-1, corners, 3).astype(np.float32)[kept]
-    made = Micropolygons(vertices, patch[kept].astype(np.int32), shades(polygons)[kept], int((~kept).sum()))
-    return _split(made) if triangles and corners == 4 else made
+    made = _room(*polygons.shape[:2])
+    for_parts(_place, parts_of(len(polygons), 256), polygons, np.asarray(matrix, np.float64), width, height, *made)
+    return _drawable(*made, patch.astype(np.int32), triangles)
+
+
+def _room(count: int, corners: int) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.bool_]]:
+    """Arrays to fill: vertices, greys, and which polygons can be drawn."""
+    return np.empty((count, corners, 3), np.float32), np.empty(count, np.uint8), np.empty(count, np.bool_)
+
+
+def _drawable(
+    vertices: NDArray[np.float32], shade: NDArray[np.uint8], kept: NDArray[np.bool_], patch: NDArray[np.int32],
+    triangles: bool,
+) -> Micropolygons:  # fmt: skip
+    """Leave out what cannot be drawn, and split quads where wanted."""
+    dropped = len(kept) - int(np.count_nonzero(kept))
+    if dropped:
+        vertices, patch, shade = vertices[kept], patch[kept], shade[kept]
+    made = Micropolygons(vertices, patch, shade, dropped)
+    return _split(made) if triangles and vertices.shape[1] == 4 else made
 
 
 def _split(polygons: Micropolygons) -> Micropolygons:
@@ -111,67 +130,159 @@ def project(
     points: NDArray[np.float64], matrix: ArrayLike, width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Screen positions (V, 3) of homogeneous points, and which of them can be used."""
-    clip = points @ np.asarray(matrix, np.float64).T
-    usable = clip[:, 3] > NEAR
-    inverse = 1.0 / np.where(usable, clip[:, 3], 1.0)
-    screen = np.empty((len(clip), 3))
-    screen[:, 0] = (0.5 + 0.5 * clip[:, 0] * inverse) * width
-    screen[:, 1] = (0.5 - 0.5 * clip[:, 1] * inverse) * height
-    screen[:, 2] = 0.5 + 0.5 * clip[:, 2] * inverse
-    usable &= (np.abs(screen[:, :2]) < GUARD_PIXELS).all(axis=1)
-    screen[~usable] = 0.0
+    screen, usable = np.empty((len(points), 3)), np.empty(len(points), np.bool_)
+    _project(points, np.asarray(matrix, np.float64), width, height, screen, usable)
     return screen, usable
 
 
 def shades(polygons: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Grey by the angle between normal and light, from either side."""
-    points = polygons[:, :, :3] / polygons[:, :, 3:]
-    normals = np.cross(points[:, 2] - points[:, 0], points[:, -1] - points[:, 1])
-    length = np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
-    lit = np.abs(normals @ LIGHT) / length
-    greys: NDArray[np.uint8] = (40.0 + 200.0 * np.minimum(lit, 1.0)).astype(np.uint8)
+    greys = np.empty(len(polygons), np.uint8)
+    for_parts(_shades, parts_of(len(polygons), 256), polygons, greys)
     return greys
 
 
-def _rates(nets: NDArray[np.float64], size: float) -> NDArray[np.int64]:
-    """Micropolygons along a patch's side: its longest control polygon in pixels over ``size``, rounded up."""
-    grid = nets.reshape(-1, 4, 4, 3)[..., :2]
+def _rates(
+    points: NDArray[np.float64], matrix: NDArray[np.float64], width: int, height: int, size: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Micropolygons along a patch's side: its longest control polygon in pixels over ``size``, rounded up; their ends.
+
+    ``ends``: where the micropolygons of each patch end.
+    """
+    grid = project(points.reshape(-1, 4), matrix, width, height)[0].reshape(-1, 4, 4, 3)[..., :2]
     rows = np.linalg.norm(np.diff(grid, axis=2), axis=-1).sum(axis=2).max(axis=1)
     columns = np.linalg.norm(np.diff(grid, axis=1), axis=-1).sum(axis=1).max(axis=1)
     wanted = np.clip(np.maximum(rows, columns) / size, 1.0, MOST_RATE)
     rates: NDArray[np.int64] = np.ceil(wanted).astype(np.int64)
-    return rates
+    return rates, np.cumsum(rates**2)
+
+
+@kernel(lent=True, error_model="numpy")
+def _to_screen(point: Any, matrix: Any, width: int, height: int, screen: Any) -> bool:
+    """Project one homogeneous point to ``screen``; whether it can be used, else it lies at 0."""
+    w = _row(point, matrix[3])
+    if not w > NEAR:
+        screen[0] = screen[1] = screen[2] = 0.0
+        return False
+    inverse = 1.0 / w
+    x = (0.5 + 0.5 * _row(point, matrix[0]) * inverse) * width
+    y = (0.5 - 0.5 * _row(point, matrix[1]) * inverse) * height
+    z = 0.5 + 0.5 * _row(point, matrix[2]) * inverse
+    usable = abs(x) < GUARD_PIXELS and abs(y) < GUARD_PIXELS
+    screen[0], screen[1], screen[2] = (x, y, z) if usable else (0.0, 0.0, 0.0)
+    return bool(usable)
+
+
+@kernel(lent=True, inline=True)
+def _row(point: Any, row: Any) -> Any:
+    """One row of a matrix times a point, as BLAS rounds it."""
+    return fma64(point[3], row[3], fma64(point[2], row[2], fma64(point[1], row[1], point[0] * row[0])))
+
+
+@kernel(lent=True, error_model="numpy")
+def _shade(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Grey of a polygon of corners a, b, c and d (d is c in a triangle)."""
+    x, y, z = c[0] / c[3] - a[0] / a[3], c[1] / c[3] - a[1] / a[3], c[2] / c[3] - a[2] / a[3]
+    u, v, w = d[0] / d[3] - b[0] / b[3], d[1] / d[3] - b[1] / b[3], d[2] / d[3] - b[2] / b[3]
+    nx, ny, nz = y * w - z * v, z * u - x * w, x * v - y * u
+    length = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-30)
+    lit = abs(nx * LIGHT[0] + ny * LIGHT[1] + nz * LIGHT[2]) / length
+    return np.uint8(40.0 + 200.0 * min(lit, 1.0)) if lit >= 0 else np.uint8(0)  # of what is not a number
+
+
+@kernel(lent=True)
+def _project(points: Any, matrix: Any, width: int, height: int, screen: Any, usable: Any) -> None:
+    for p in range(len(points)):
+        usable[p] = _to_screen(points[p], matrix, width, height, screen[p])
+
+
+@kernel(lent=True)
+def _shades(part: int, parts: int, polygons: Any, greys: Any) -> None:
+    last = polygons.shape[1] - 1
+    for p in range(part * len(polygons) // parts, (part + 1) * len(polygons) // parts):
+        greys[p] = _shade(polygons[p, 0], polygons[p, 1], polygons[p, 2], polygons[p, last])
+
+
+@kernel(lent=True)
+def _place(
+    part: int, parts: int, polygons: Any, matrix: Any, width: int, height: int, vertices: Any, shade: Any, kept: Any
+) -> None:
+    """Project and shade a share of the polygons."""
+    last = polygons.shape[1] - 1
+    for p in range(part * len(polygons) // parts, (part + 1) * len(polygons) // parts):
+        kept[p] = True
+        for k in range(last + 1):
+            kept[p] &= _to_screen(polygons[p, k], matrix, width, height, vertices[p, k])
+        shade[p] = _shade(polygons[p, 0], polygons[p, 1], polygons[p, 2], polygons[p, last])
 
 
 @kernel
-def _evaluate(points: Any, rates: Any, ends: Any, polygons: Any) -> None:
-    """Fill ``polygons`` (sum of rates^2, 4, 4) with the quads of each patch, row by row."""
-    grid = np.empty((rates.max() + 1, rates.max() + 1, 4)) if len(rates) else np.empty((0, 0, 4))
-    u = np.empty(4)
-    v = np.empty(4)
-    for p in range(len(rates)):
-        rate = rates[p]
-        for i in range(rate + 1):
-            _bernstein(i / rate, v)
-            for j in range(rate + 1):
-                _bernstein(j / rate, u)
-                for d in range(4):
-                    total = 0.0
-                    for r in range(4):
-                        for c in range(4):
-                            total += v[r] * u[c] * points[p, 4 * r + c, d]
-                    grid[i, j, d] = total
-        at = ends[p] - rate * rate
-        for i in range(rate):
-            for j in range(rate):
-                polygons[at, 0] = grid[i, j]
-                polygons[at, 1] = grid[i, j + 1]
-                polygons[at, 2] = grid[i + 1, j + 1]
-                polygons[at, 3] = grid[i + 1, j]
+def _dice(
+    part: int, parts: int, points: Any, rates: Any, ends: Any, matrix: Any, width: int, height: int, vertices: Any,
+    shade: Any, kept: Any,
+) -> None:  # fmt: skip
+    """Evaluate, project and shade a share of the patches, each vertex of a patch once."""
+    first, last = part * len(rates) // parts, (part + 1) * len(rates) // parts
+    side = rates[first:last].max() + 1 if last > first else 0
+    grid, screen = np.empty((side, side, 4)), np.empty((side, side, 3), np.float32)
+    usable = np.empty((side, side), np.bool_)
+    for p in range(first, last):
+        _surface(points[p], rates[p], grid)
+        for i in range(rates[p] + 1):
+            for j in range(rates[p] + 1):
+                usable[i, j] = _to_screen(grid[i, j], matrix, width, height, screen[i, j])
+        at = ends[p] - rates[p] * rates[p]
+        for i in range(rates[p]):
+            for j in range(rates[p]):
+                kept[at] = usable[i, j] and usable[i, j + 1] and usable[i + 1, j] and usable[i + 1, j + 1]
+                shade[at] = _shade(grid[i, j], grid[i, j + 1], grid[i + 1, j + 1], grid[i + 1, j])
+                _quad(screen, i, j, vertices[at])
                 at += 1
 
 
 @kernel
+def _evaluate(part: int, parts: int, points: Any, rates: Any, ends: Any, polygons: Any) -> None:
+    """Fill ``polygons`` (sum of rates^2, 4, 4) with the quads of a share of the patches, row by row."""
+    first, last = part * len(rates) // parts, (part + 1) * len(rates) // parts
+    side = rates[first:last].max() + 1 if last > first else 0
+    grid = np.empty((side, side, 4))
+    for p in range(first, last):
+        _surface(points[p], rates[p], grid)
+        at = ends[p] - rates[p] * rates[p]
+        for i in range(rates[p]):
+            for j in range(rates[p]):
+                _quad(grid, i, j, polygons[at])
+                at += 1
+
+
+@kernel(lent=True, inline=True)
+def _quad(grid: Any, i: int, j: int, quad: Any) -> None:
+    """Copy the four corners of a quad of the grid, in turn."""
+    for d in range(quad.shape[1]):
+        quad[0, d], quad[1, d] = grid[i, j, d], grid[i, j + 1, d]
+        quad[2, d], quad[3, d] = grid[i + 1, j + 1, d], grid[i + 1, j, d]
+
+
+@kernel
+def _surface(points: Any, rate: int, grid: Any) -> None:
+    """Points of a patch at (rate + 1) x (rate + 1) places."""
+    u, v = np.empty(4), np.empty(4)
+    for i in range(rate + 1):
+        _bernstein(i / rate, v)
+        for j in range(rate + 1):
+            _bernstein(j / rate, u)
+            x, y, z, w = 0.0, 0.0, 0.0, 0.0
+            for r in range(4):
+                for c in range(4):
+                    weight = v[r] * u[c]
+                    x += weight * points[4 * r + c, 0]
+                    y += weight * points[4 * r + c, 1]
+                    z += weight * points[4 * r + c, 2]
+                    w += weight * points[4 * r + c, 3]
+            grid[i, j, 0], grid[i, j, 1], grid[i, j, 2], grid[i, j, 3] = x, y, z, w
+
+
+@kernel(lent=True)
 def _bernstein(t: Any, out: Any) -> None:
     s = 1.0 - t
     out[0] = s * s * s

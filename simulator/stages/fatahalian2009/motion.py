@@ -20,7 +20,13 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
+    covering_triangle,
+    depth_at,
+    set_edges,
+    set_up,
+    snap,
+)
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     count_hits,
@@ -196,11 +202,9 @@ def begin_warp(first: int, last: int, corners: int, simt: Simt, row: Any) -> Non
     row[MotionEvent.LOAD_BYTES] += total
 
 
-@kernel
-def end_test(samples: Samples, active: int, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
-    """Count one warp execution of the sample test, and the atomics of its hits."""
-    row[MotionEvent.TEST_WARPS] += 1
-    row[MotionEvent.SAMPLE_TESTS] += active
+@kernel(lent=True)
+def count_atomic(samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
+    """Count the atomics of the hits of one warp execution of the sample test."""
     if hits:
         row[MotionEvent.SAMPLE_HITS] += hits
         row[MotionEvent.HIT_WARPS] += 1
@@ -212,6 +216,14 @@ def end_test(samples: Samples, active: int, addresses: Any, hits: int, simt: Sim
 
 
 @kernel
+def end_test(samples: Samples, active: int, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
+    """Count one warp execution of the sample test, and the atomics of its hits."""
+    row[MotionEvent.TEST_WARPS] += 1
+    row[MotionEvent.SAMPLE_TESTS] += active
+    count_atomic(samples, addresses, hits, simt, row)
+
+
+@kernel(lent=True)
 def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, polygon: Any) -> None:
     """Write polygon p as it stands at a time and a lens point to ``polygon`` (3 or 4, 3)."""
     for k in range(start.shape[1]):
@@ -229,6 +241,20 @@ def test_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at
     if triangle < 0:
         return -1
     return keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
+
+
+@kernel(lent=True)
+def hit_sample(p: int, polygon: Any, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
+    """Test a sample of a placed polygon that is not set up; returns the byte address of a hit's atomic, -1 for none."""
+    edges, boxes, depths, snapped = setup
+    snap(polygon, boxes, snapped)
+    if at_x < boxes[0, 0] or at_y < boxes[0, 1] or at_x > boxes[0, 2] or at_y > boxes[0, 3]:
+        return -1
+    set_edges(polygon, edges, boxes, depths, snapped)
+    triangle = covering_triangle(edges, at_x, at_y)
+    if triangle < 0:
+        return -1
+    return keep_nearest(samples, x, y, s, depth_at(edges, depths, triangle, at_x, at_y), p)
 
 
 @kernel
