@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, TAIL, Term, bound_launch, bound_terms, moved_of
+from tilestamp.models.bounds import TAIL, Term, bound_launch, bound_terms, moved_of
 from tilestamp.models.demand import SUMS, Demand, Whole, demand_of, demands, rates
 from tilestamp.models.events import EVENTS
 from tilestamp.models.events import MachineEvent as E
@@ -17,8 +17,13 @@ from tilestamp.models.schedule import Loads, Played, load_units, loads, play, sc
 
 
 def launch_prices(
-    launch: Launch, machines: NDArray[np.float64], facts: NDArray[np.float64], *, scheduled: bool
-) -> NDArray[np.float64]:
+    launch: Launch,
+    machines: NDArray[np.float64],
+    facts: NDArray[np.float64],
+    prices: NDArray[np.float64],
+    *,
+    scheduled: bool,
+) -> None:
     """Price one launch on many machines.
 
     Parameters
@@ -27,17 +32,12 @@ def launch_prices(
     machines : ndarray, (machines, len(Number)), float64
         Of ``tilestamp.models.numbers``.
     facts : ndarray, (machines, len(Fact)), float64
+    prices : ndarray, (machines, COLUMNS), float64
+        Filled in: cycles of each ``Term``, and each ``Result``.
     scheduled : bool
         By the schedule of its units, else by the roofline.
-
-    Returns
-    -------
-    ndarray, (machines, COLUMNS), float64
-        Cycles of each ``Term``, and each ``Result``.
     """
-    prices = np.zeros((len(machines), COLUMNS))
     _price(launch.shape, launch.kinds, launch.totals, machines, facts, scheduled, prices)
-    return prices
 
 
 class Opened(NamedTuple):
