@@ -7,21 +7,18 @@ missing there.
 """
 
 from collections.abc import Callable, Hashable, Sequence
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.atomic_units import dealing_of, fullest_unit_ns
-from tilestamp.models.bounds import Fact
+from tilestamp.models.bounds import COLUMNS, Fact
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import launch_prices
 from tilestamp.models.machine import Machine
 from tilestamp.models.numbers import Number, numbers_of
 from tilestamp.models.occupancy import holding_of, residency
 from tilestamp.models.traffic import Traffic, caches_of, traffic
-
-T = TypeVar("T")
 
 
 class Batch:
@@ -49,37 +46,51 @@ class Batch:
         """Issue clocks in Hz, (machines,)."""
         return self.numbers[:, Number.SM_CLOCK_MHZ] * 1e6
 
-    def traffic(self, launches: Sequence[Launch | PipeLaunch]) -> list[list[Traffic]]:
-        """Bytes of each launch of a frame, a list with an entry a machine."""
+    def traffic(self, launches: Sequence[Launch | PipeLaunch]) -> NDArray[np.float64]:
+        """Bytes of each launch of a frame, (launches, machines, len(Traffic))."""
         moved = [traffic(launches, machine) for machine in self._caches.machines]
-        return [self._caches.each(launch) for launch in zip(*moved, strict=True)]
+        return self._caches.each(np.array(moved).reshape(len(moved), len(launches), len(Traffic._fields))).swapaxes(
+            0, 1
+        )
 
-    def prices(self, launch: Launch, moved: Sequence[Traffic], *, scheduled: bool) -> NDArray[np.float64]:
-        """Price one launch, (machines, COLUMNS); see ``launch_prices`` and ``facts``."""
-        return launch_prices(launch, self.numbers, self.facts(launch, moved), scheduled=scheduled)
+    def prices(
+        self, launches: Sequence[Launch | PipeLaunch], moved: NDArray[np.float64], *, scheduled: bool
+    ) -> NDArray[np.float64]:
+        """Price the launches of a frame, (launches, machines, COLUMNS); see ``launch_prices`` and ``facts``.
 
-    def facts(self, launch: Launch, moved: Sequence[Traffic]) -> NDArray[np.float64]:
-        """Facts of one launch, (machines, len(Fact)).
+        Passes of the fixed-function pipe are left out: their rows are 0.
+        """
+        prices = np.zeros((*moved.shape[:2], COLUMNS))
+        for launch, facts, into in zip(launches, self.facts(launches, moved), prices, strict=True):
+            if isinstance(launch, Launch):
+                launch_prices(launch, self.numbers, facts, into, scheduled=scheduled)
+        return prices
+
+    def facts(self, launches: Sequence[Launch | PipeLaunch], moved: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Facts of the launches of a frame, (launches, machines, len(Fact)); of the fixed-function pipe: its bytes.
 
         Parameters
         ----------
-        launch : Launch
-        moved : sequence of Traffic
-            Its bytes on each machine.
+        launches : sequence of Launch or PipeLaunch
+        moved : ndarray, (launches, machines, len(Traffic))
+            Their bytes on each machine.
 
         Raises
         ------
         TilestampError
             A block that a machine cannot launch.
         """
-        facts = np.empty((len(self.machines), len(Fact)))
-        held = [residency(m, launch.block, launch.registers, launch.shared_bytes) for m in self._holding.machines]
-        facts[:, Fact.RESIDENT_BLOCKS] = self._holding.each([each.blocks for each in held])
-        facts[:, Fact.DRAM_BYTES : Fact.GAP_LINES + 1] = moved
-        facts[:, Fact.FULLEST_NS] = 0.0
-        if launch.atomic_requests is not None:
-            fullest = [fullest_unit_ns(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
-            facts[:, Fact.FULLEST_NS] = self._dealing.each(fullest)
+        facts = np.zeros((*moved.shape[:2], len(Fact)))
+        facts[:, :, Fact.DRAM_BYTES : Fact.GAP_LINES + 1] = moved
+        for launch, into in zip(launches, facts, strict=True):
+            if isinstance(launch, Launch):
+                asked = launch.block, launch.registers, launch.shared_bytes
+                into[:, Fact.RESIDENT_BLOCKS] = self._holding.each(
+                    [residency(m, *asked).blocks for m in self._holding.machines]
+                )
+                if launch.atomic_requests is not None:
+                    dealt = [fullest_unit_ns(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
+                    into[:, Fact.FULLEST_NS] = self._dealing.each(dealt)
         return facts
 
 
@@ -88,9 +99,11 @@ class _Shared:
 
     def __init__(self, machines: Sequence[Machine], key: Callable[[Machine], Hashable]) -> None:
         places: dict[Hashable, int] = {}
-        self._which = [places.setdefault(key(machine), len(places)) for machine in machines]
-        self.machines = [machines[self._which.index(place)] for place in range(len(places))]
+        self._which = np.array([places.setdefault(key(machine), len(places)) for machine in machines], np.intp)
+        _, firsts = np.unique(self._which, return_index=True)
+        self.machines = [machines[first] for first in firsts]
 
-    def each(self, values: Sequence[T]) -> list[T]:
-        """Give each machine the value of its key's."""
-        return [values[place] for place in self._which]
+    def each(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Give each machine the value of its key's, along the first axis."""
+        found: NDArray[np.float64] = np.asarray(values, np.float64)[self._which]
+        return found

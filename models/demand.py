@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from tilestamp.models.events import EVENTS, INSTRUCTION_CLASSES
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
+from tilestamp.models.kinds import Kinds, each_a_kind
 from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.machine import Machine
 from tilestamp.models.numbers import Number as M
@@ -94,7 +95,7 @@ class Whole(NamedTuple):
     Parameters
     ----------
     issue, shared, l1, chain : float
-        Sums.
+        Sums, in the order of the units.
     way : float
         The shortest way to memory and back: of a unit's start and chain, a share a round trip; 0 where there is none.
     """
@@ -116,15 +117,23 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     moved : Traffic
         Its bytes.
     """
-    matrix = rates(launch.shape, numbers_of([machine])[0], Traffic(*map(float, moved)), launch.totals)
-    found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
-    demands(launch.columns, matrix, found)
+    matrix = np.empty((SUMS, EVENTS))
+    rates(launch.shape, numbers_of([machine])[0], Traffic(*map(float, moved)), launch.totals, matrix)
+    found: Demand = demand_of(len(launch.events))
+    demands(each_a_kind(launch.columns), matrix, found)
     return found
 
 
 @kernel
-def rates(launch: Shape, machine: Any, moved: Traffic, totals: Any) -> Any:
-    """Cycles of each machine event, (SUMS, EVENTS): 0 where the launch has none of it.
+def demand_of(kinds: int) -> Any:
+    """Room for the demands of so many kinds of units."""
+    table = np.empty((6, kinds))
+    return Demand(table[0], table[1], table[2], table[3], table[4], table[5])
+
+
+@kernel(lent=True)
+def rates(launch: Shape, machine: Any, moved: Traffic, totals: Any, matrix: Any) -> None:
+    """Fill in the cycles of each machine event: 0 where the launch has none of it.
 
     Parameters
     ----------
@@ -133,8 +142,10 @@ def rates(launch: Shape, machine: Any, moved: Traffic, totals: Any) -> Any:
     moved : Traffic
     totals : ndarray, (EVENTS,)
         Events of all units.
+    matrix : ndarray, (SUMS, EVENTS)
+        Filled in.
     """
-    matrix = np.zeros((SUMS, EVENTS))
+    matrix[:] = 0.0
     _issue_rates(matrix, machine)
     passes = machine[M.MEMORY_BANK_PASS_CYCLES]
     groups = machine[M.SM_WARP_SIZE] / machine[M.MEMORY_BANK_LANES]
@@ -148,10 +159,9 @@ def rates(launch: Shape, machine: Any, moved: Traffic, totals: Any) -> Any:
         if totals[column] == 0:
             matrix[:, column] = 0.0
     _other_rates(matrix[Sum.OTHERS], launch, machine)
-    return matrix
 
 
-@kernel
+@kernel(lent=True)
 def _issue_rates(matrix: Any, machine: Any) -> None:
     """SM cycles of the schedulers, and of the execution units behind them, which work side by side."""
     schedulers = machine[M.SM_SCHEDULERS]
@@ -165,7 +175,7 @@ def _issue_rates(matrix: Any, machine: Any) -> None:
     matrix[Sum.PIPE_SFU, E.SFU] = machine[M.PIPE_SFU] / schedulers
 
 
-@kernel
+@kernel(lent=True)
 def _l1_rates(l1: Any, machine: Any, moved: Traffic, totals: Any) -> None:
     """SM cycles of a byte: stores may be slower than loads, and lines moved in part come on top."""
     lines = machine[M.MEMORY_L1_LINE_CYCLES]
@@ -175,7 +185,7 @@ def _l1_rates(l1: Any, machine: Any, moved: Traffic, totals: Any) -> None:
     l1[E.STORE_BYTES] += lines * moved.written_lines / max(1.0, totals[E.STORE_BYTES])
 
 
-@kernel
+@kernel(lent=True)
 def _chain_rates(matrix: Any, machine: Any, moved: Traffic) -> None:
     """Cycles of the dependent round trips; a load waits for where its data lies."""
     far = machine[M.LATENCY_DRAM_CYCLES]
@@ -189,7 +199,7 @@ def _chain_rates(matrix: Any, machine: Any, moved: Traffic) -> None:
     matrix[Sum.CHAIN, E.CHAIN_BARRIER] = machine[M.LATENCY_BARRIER_CYCLES]
 
 
-@kernel
+@kernel(lent=True)
 def _other_rates(others: Any, launch: Shape, machine: Any) -> None:
     """Rates that are of no event."""
     schedulers = machine[M.SM_SCHEDULERS]
@@ -201,44 +211,57 @@ def _other_rates(others: Any, launch: Shape, machine: Any) -> None:
         others[Other.BESIDE] = IN_THE_WAY * min(1.0, warps / schedulers - 1.0) * schedulers / warps
 
 
-@kernel
+@kernel(lent=True)
 def atomic_rate(totals: Any, awaited: float, unawaited: float) -> float:
     """Requests in a clock; there may be more where nobody waits for the value returned (0: there are not)."""
     return unawaited if unawaited and not totals[E.CHAIN_ATOMIC] else awaited
 
 
 @kernel
-def demands(events: Any, matrix: Any, found: Demand) -> Whole:
-    """Fill in what each unit asks for, and sum up.
+def demands(units: Kinds, matrix: Any, found: Demand) -> Whole:
+    """Fill in what each kind of unit asks for, and sum up over all units.
 
     Parameters
     ----------
-    events : ndarray, (EVENTS, units)
+    units : Kinds
     matrix : ndarray, (SUMS, EVENTS)
         From ``rates``.
     found : Demand
         Filled in.
     """
-    units, others = events.shape[1], matrix[Sum.OTHERS]
+    events, others = units.events, matrix[Sum.OTHERS]
+    kinds = events.shape[1]
     sums = np.empty((SUMS, TOGETHER))
-    issues = shareds = l1s = chains = 0.0
-    way = np.inf if units else 0.0
-    for first in range(0, units, TOGETHER):
-        last = min(units, first + TOGETHER)
+    way = np.inf if kinds else 0.0
+    for first in range(0, kinds, TOGETHER):
+        last = min(kinds, first + TOGETHER)
         sum_up(matrix[: Sum.OTHERS], events, first, last, sums, 0)
         for i in range(last - first):
-            row, unit = sums[:, i], first + i
+            row, kind = sums[:, i], first + i
             pipe = max(max(row[Sum.PIPE_FP32], row[Sum.PIPE_INT32]), max(row[Sum.PIPE_MUL32], row[Sum.PIPE_SFU]))
             issue = max(row[Sum.DISPATCH], pipe)
             shared, l1, chain = row[Sum.SHARED], row[Sum.L1], row[Sum.CHAIN] + others[Other.START]
-            found.issue[unit], found.shared[unit], found.l1[unit], found.chain[unit] = issue, shared, l1, chain
-            found.scheduler[unit] = issue * others[Other.SPREAD]
+            found.issue[kind], found.shared[kind], found.l1[kind], found.chain[kind] = issue, shared, l1, chain
+            found.scheduler[kind] = issue * others[Other.SPREAD]
             if others[Other.LOOP]:
-                found.alone[unit] = both(chain, found.scheduler[unit])
+                found.alone[kind] = both(chain, found.scheduler[kind])
             else:
                 waited = issue * others[Other.BESIDE] + l1 * others[Other.IN_STEP]
-                found.alone[unit] = max(chain + waited, found.scheduler[unit])
-            issues, shareds, l1s, chains = issues + issue, shareds + shared, l1s + l1, chains + chain
-            trips = max(1.0, events[E.CHAIN_LOAD, unit] + events[E.CHAIN_ATOMIC, unit])
+                found.alone[kind] = max(chain + waited, found.scheduler[kind])
+            trips = max(1.0, events[E.CHAIN_LOAD, kind] + events[E.CHAIN_ATOMIC, kind])
             way = min(way, others[Other.START] + row[Sum.CHAIN] / trips)
-    return Whole(issues, shareds, l1s, chains, way)
+    issue, shared, l1, chain = _together(found, units.which)
+    return Whole(issue, shared, l1, chain, way)
+
+
+@kernel(lent=True)
+def _together(each: Demand, which: Any) -> tuple[float, float, float, float]:
+    """Issue, shared, l1 and chain of all units."""
+    issue = shared = l1 = chain = 0.0
+    for i in range(len(which)):
+        kind = which[i]
+        issue += each.issue[kind]
+        shared += each.shared[kind]
+        l1 += each.l1[kind]
+        chain += each.chain[kind]
+    return issue, shared, l1, chain

@@ -8,6 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.kinds import Kinds, each_a_kind, kinds_of
+
 SECTOR_BYTES, LINE_BYTES = 32, 128
 
 
@@ -134,6 +136,11 @@ class Launch:
     def columns(self) -> NDArray[np.float64]:
         """Events by column, as kernels read them, (len(MachineEvent), units)."""
         return np.ascontiguousarray(self.events.T)
+
+    @cached_property
+    def kinds(self) -> Kinds:
+        """Its units by kind; of a loop, where it matters which unit follows which, each is a kind of its own."""
+        return each_a_kind(self.columns) if self.loop else kinds_of(self.columns, np.flatnonzero(self.totals))
 
     @cached_property
     def totals(self) -> NDArray[np.float64]:

@@ -5,19 +5,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bounds import COLUMNS, TAIL, Term, bound_launch, bound_terms, moved_of
-from tilestamp.models.demand import SUMS, Demand, Whole, demands, rates
+from tilestamp.models.bounds import TAIL, Term, bound_launch, bound_terms, moved_of
+from tilestamp.models.demand import SUMS, Demand, Whole, demand_of, demands, rates
 from tilestamp.models.events import EVENTS
 from tilestamp.models.events import MachineEvent as E
 from tilestamp.models.kernel import kernel
+from tilestamp.models.kinds import Kinds, each_a_kind
 from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.schedule import Loads, Played, load_units, loads, play, schedule_launch
 
 
 def launch_prices(
-    launch: Launch, machines: NDArray[np.float64], facts: NDArray[np.float64], *, scheduled: bool
-) -> NDArray[np.float64]:
+    launch: Launch,
+    machines: NDArray[np.float64],
+    facts: NDArray[np.float64],
+    prices: NDArray[np.float64],
+    *,
+    scheduled: bool,
+) -> None:
     """Price one launch on many machines.
 
     Parameters
@@ -26,17 +32,12 @@ def launch_prices(
     machines : ndarray, (machines, len(Number)), float64
         Of ``tilestamp.models.numbers``.
     facts : ndarray, (machines, len(Fact)), float64
+    prices : ndarray, (machines, COLUMNS), float64
+        Filled in: cycles of each ``Term``, and each ``Result``.
     scheduled : bool
         By the schedule of its units, else by the roofline.
-
-    Returns
-    -------
-    ndarray, (machines, COLUMNS), float64
-        Cycles of each ``Term``, and each ``Result``.
     """
-    prices = np.zeros((len(machines), COLUMNS))
-    _price(launch.shape, launch.columns, launch.totals, machines, facts, scheduled, prices)
-    return prices
+    _price(launch.shape, launch.kinds, launch.totals, machines, facts, scheduled, prices)
 
 
 class Opened(NamedTuple):
@@ -57,40 +58,39 @@ class Opened(NamedTuple):
 
 def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np.float64]) -> Opened:
     """What the price of one launch on one machine is made of; parameters as a row of those of ``launch_prices``."""
-    found = Demand(*np.empty((len(Demand._fields), len(launch.events))))
-    units = np.empty(len(launch.events)), np.empty(len(launch.events)), np.empty(len(launch.events))
-    whole = demands(launch.columns, rates(launch.shape, machine, moved_of(facts), launch.totals), found)
-    load_units(found, *units)
+    units, matrix = each_a_kind(launch.columns), np.empty((SUMS, EVENTS))
+    found, costs = demand_of(len(launch.events)), np.empty((3, len(launch.events)))
+    rates(launch.shape, machine, moved_of(facts), launch.totals, matrix)
+    whole = demands(units, matrix, found)
+    load_units(found, *costs)
     terms = bound_terms(launch.shape, whole, launch.totals, machine, facts)
-    sizes = launch.columns[E.LOAD_BYTES] + launch.columns[E.STORE_BYTES]
-    loaded = loads(launch.shape, units, launch.columns[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, facts)
+    amounts = amounts_of(launch.shape, units.events)
+    loaded = loads(launch.shape, units.which, tuple(costs), amounts, terms, whole.way, machine, facts)
     return Opened(found, terms, loaded)
 
 
 @kernel
-def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, scheduled: bool, prices: Any) -> None:
+def _price(launch: Shape, units: Kinds, totals: Any, machines: Any, facts: Any, scheduled: bool, prices: Any) -> None:
     """Fill in all rows; what units ask for, and how the SMs work them off, is made anew where it is another."""
-    count = launch.units
-    table = np.empty((6, count))
-    units = Demand(table[0], table[1], table[2], table[3], table[4], table[5])
-    sm, own, alone = np.empty(count), np.empty(count), np.empty(count)
-    sizes = events[E.LOAD_BYTES] + events[E.STORE_BYTES]
-    seen, whole = np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
+    kinds = units.events.shape[1]
+    found, amounts = demand_of(kinds), amounts_of(launch, units.events)
+    sm, own, alone = np.empty(kinds), np.empty(kinds), np.empty(kinds)
+    matrix, seen, whole = np.empty((SUMS, EVENTS)), np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
     settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
-        matrix = rates(launch, machine, moved_of(fact), totals)
-        if (matrix != seen).any():
-            whole = demands(events, matrix, units)
-            load_units(units, sm, own, alone)
-            seen, settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        rates(launch, machine, moved_of(fact), totals, matrix)
+        if not _alike(matrix, seen):
+            whole = demands(units, matrix, found)
+            load_units(found, sm, own, alone)
+            seen[:], settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         terms = bound_terms(launch, whole, totals, machine, fact)
         for column in range(
             TAIL
         ):  # Numba compiles row[:TAIL] = terms for a second: what it would say of unlike lengths
             row[column] = terms[column]
         if scheduled:
-            loaded = loads(launch, (sm, own, alone), events[E.ATOMIC_REQUESTS], sizes, terms, whole.way, machine, fact)
+            loaded = loads(launch, units.which, (sm, own, alone), amounts, terms, whole.way, machine, fact)
             queue, pace = terms[Term.QUEUE] if launch.drawn else loaded.memory, loaded.pace
             now = (float(loaded.places), float(loaded.sms), pace.interval, pace.start, pace.slower, queue)
             if now != settled:
@@ -98,3 +98,19 @@ def _price(launch: Shape, events: Any, totals: Any, machines: Any, facts: Any, s
             schedule_launch(loaded, played, terms, loaded.sms < machine[M.SM_COUNT], row)
         else:
             bound_launch(terms, whole.way, row)
+
+
+@kernel
+def amounts_of(launch: Shape, events: Any) -> Any:
+    """What serves all units one after another has to do for each kind: ``loads``."""
+    return events[E.ATOMIC_REQUESTS] if launch.drawn else events[E.LOAD_BYTES] + events[E.STORE_BYTES]
+
+
+@kernel(lent=True)
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two matrices are the same."""
+    for i in range(len(one)):
+        for j in range(one.shape[1]):
+            if one[i, j] != other[i, j]:
+                return False
+    return True

@@ -53,50 +53,61 @@ def record_of(units: int) -> Record:
 
 @kernel
 def list_schedule(
-    sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace, record: Record
+    which: Any, sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace, record: Record
 ) -> tuple[float, float, float]:
     """End of all units; the start of the one that ends last; how long all hold their places; each unit in ``record``.
 
-    ``record`` may have no room.
+    Costs have a row a kind of unit; ``which`` is each unit's (``models.kinds``). ``record`` may have no room.
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
     taken does not start at once later. Those that waited for a place go on more slowly while memory is busy (``Pace``).
     ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
     there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
-    units = len(alone)
+    units = len(which)
     waits, shares = units > places, places > sms < units
+    drawing, moving, recording = len(draws) > 0, len(moves) > 0, len(record.start) > 0
     free, free_who = tournament(places if waits else 1)
     served, served_who = tournament(sms if shares else 1)
-    drawn = moved = end = last_start = held = 0.0
+    drawn = moved = end = last_start = held = soonest = idle = 0.0
     interval, start, slower = pace
-    begun, busy = -interval, moves.sum() if len(moves) > 0 else 0.0
+    begun, busy = -interval, total(moves, which) if moving else 0.0
     for i in range(units):
+        kind, late = which[i], i >= places
         begun += interval
-        if i >= places:
-            begun = max(begun, free[0])
-        done = max(served[0], begun + start) + sm[i]
+        if late:
+            begun = max(begun, soonest)
+        done = max(idle, begun + start) + sm[kind]
         if shares:
-            replay(served, served_who, done)
+            idle = replay(served, served_who, done)
         begin = begun
-        if len(draws) > 0:
-            drawn = max(drawn, begun) + draws[i]
+        if drawing:
+            drawn = max(drawn, begun) + draws[kind]
             begin = drawn
-        if len(moves) > 0:
-            moved = max(moved, begun + start) + moves[i]
+        if moving:
+            moved = max(moved, begun + start) + moves[kind]
             done = max(done, moved)
-        own = alone[i]
-        if i >= places:
+        own = alone[kind]
+        if late and slower > 1.0:
             own += min((slower - 1.0) * own, (1.0 - 1.0 / slower) * max(0.0, busy - begin))
         done = max(done, begin + own)
-        if len(record.start) > 0:
+        if recording:
             record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
         held += done - begun
         if done > end:
             end, last_start = done, begun
         if waits:
-            replay(free, free_who, done)
+            soonest = replay(free, free_who, done)
     return end, last_start, held
+
+
+@kernel
+def total(costs: Any, which: Any) -> float:
+    """Costs of all units, added up in their order."""
+    total = 0.0
+    for i in range(len(which)):
+        total += costs[which[i]]
+    return total
 
 
 @kernel
@@ -104,12 +115,13 @@ def tournament(players: int) -> Any:
     """Times of ``players`` that meet in a tournament: the winner's, which is the soonest, and each game's loser's.
 
     ``times[0]`` and ``who[0]`` are the winner's; game ``g`` is played by the winners of games ``2 g`` and ``2 g + 1``.
+    Times are not below 0, and kept as their bits: as integers these have the same order, and compare sooner.
     """
     leaves = 1
     while leaves < players:
         leaves *= 2
     times = np.zeros(leaves)
-    who = np.zeros(leaves, np.int64)
+    who = np.zeros(leaves, np.uint32)
     for game in range(1, leaves):  # all times are 0: let the left win everywhere, so the right loses
         leaf = 2 * game + 1
         while leaf < leaves:
@@ -117,21 +129,22 @@ def tournament(players: int) -> Any:
         who[game] = leaf - leaves
         if leaf - leaves >= players:
             times[game] = np.inf
-    return times, who
+    return times.view(np.uint64), who
 
 
-@kernel
-def replay(times: Any, who: Any, time: float) -> None:
-    """Give the winner a later time, and play its games again."""
-    winner = who[0]
-    game = (winner + len(times)) >> 1
-    while game > 0:
+@kernel(lent=True, inline=True)
+def replay(times: Any, who: Any, time: float) -> float:
+    """Give the winner a later time, play its games again, and return the time of whoever wins now."""
+    bits, winner = np.float64(time).view(np.uint64), who[0]
+    game = (winner + np.uint32(len(times))) >> np.uint32(1)
+    while game > np.uint32(0):
         other, loser = times[game], who[game]
-        beaten = other < time
-        times[game] = time if beaten else other
+        beaten = other < bits
+        times[game] = bits if beaten else other
         who[game] = winner if beaten else loser
-        time = other if beaten else time
+        bits = other if beaten else bits
         winner = loser if beaten else winner
-        game >>= 1
-    times[0] = time
+        game >>= np.uint32(1)
+    times[0] = bits
     who[0] = winner
+    return np.uint64(bits).view(np.float64)

@@ -10,6 +10,7 @@ Cycles are those of ``sm.clock_mhz``, the clock at which instructions issue (the
 import hashlib
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -18,12 +19,12 @@ import msgspec.structs
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.fitted import Fitted
-from tilestamp.models.machine_numbers import plain_number, plain_numbers, refusal, same_lanes
+from tilestamp.models.machine_numbers import plain_number, refusal, same_lanes, whole_numbers
 from tilestamp.models.machine_parts import Atomics, FixedFunction, Identity, Issue, Latency, Launching, Memory, Pipe, Sm
 from tilestamp.models.nearest_name import did_you_mean
 from tilestamp.models.paths import is_file
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
-from tilestamp.models.used import note
+from tilestamp.models.used import collecting, note
 
 FOLDER = Path(__file__).parent / "machines"
 Provenance = Literal["published", "measured", "derived", "fitted", "assumed"]
@@ -149,7 +150,7 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
     shipped = FOLDER / f"{machine.name}.toml"
     if is_file(shipped) and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
         machine = msgspec.structs.replace(machine, file=f"{path.name}, digest {machine.digest}")
-    note("machines", machine.name, machine.digest)
+    note_machine(machine)
     return machine
 
 
@@ -168,14 +169,16 @@ def altered(
     provenance, source : str
         What the new numbers are, and where they come from.
     """
-    table = msgspec.to_builtins(machine)
+    table: dict[str, Any] = {}  # sections that change
     changes = dict(machine.changes)
     values = same_lanes(machine.sm.warp_size, machine.issue, machine.pipe, values) | {
         key: plain_number(value) for key, value in values.items()
     }
     for key, value in values.items():
         *path, last = str(key).split(".")
-        section: Any = table if path and path[0] in SECTIONS else {}
+        if path and path[0] in SECTIONS and path[0] not in table:
+            table[path[0]] = msgspec.to_builtins(getattr(machine, path[0]))
+        section: Any = table
         for step in path:
             section = section.get(step) if isinstance(section, dict) else None
         if not isinstance(section, dict) or isinstance(section.get(last, {}), dict):
@@ -184,13 +187,20 @@ def altered(
         section[last] = value
         if value != before:
             changes[key] = before, value
-    sections = {key: table[key] for key in SECTIONS if table.get(key) is not None}
+    sections = {name: table.get(name) or getattr(machine, name) for name in SECTIONS}
+    sections = {name: section for name, section in sections.items() if section is not None}
     origins = machine.provenance | dict.fromkeys(values, (provenance, source))
     fitted_to = {key: cells for key, cells in machine.fitted_to.items() if key not in values}
     marks = {"changes": changes, "file": machine.file, "fitted_to": fitted_to}
     changed = msgspec.structs.replace(_convert(sections, origins, machine.name), **marks)
-    note("machines", changed.name, changed.digest)
+    note_machine(changed)
     return changed
+
+
+def note_machine(machine: Machine) -> None:
+    """Note that a machine is used: its name is only put together where somebody collects."""
+    if collecting():
+        note("machines", machine.name, machine.digest)
 
 
 def _build(table: dict[str, Any], file: str) -> Machine:
@@ -236,15 +246,31 @@ def _plain(
 
 
 def _convert(sections: dict[str, Any], origins: dict[str, tuple[Provenance, str]], file: str) -> Machine:
-    sections = {name: plain_numbers(values, SECTIONS[name]) for name, values in sections.items()}
-    whole = {"fixed_function": None} | sections | {"provenance": origins, "digest": ""}
+    """Make a machine of its sections: tables, and those of another machine as they are there."""
+    tables = {
+        name: whole_numbers(values, SECTIONS[name]) for name, values in sections.items() if isinstance(values, dict)
+    }
+    sections = sections | tables
     try:
-        machine = msgspec.convert(whole, Machine)
+        machine = msgspec.convert({"fixed_function": None, "provenance": {}, "digest": ""} | sections, Machine)
     except msgspec.ValidationError as error:
-        raise TilestampError(f"{file}: {refusal(str(error), sections, SECTIONS)}") from error
+        raise TilestampError(f"{file}: {refusal(str(error), tables, SECTIONS)}") from error
     _check_sense(machine, file)
-    digest = hashlib.sha256(msgspec.json.encode(sections, order="deterministic")).hexdigest()[:16]
-    return msgspec.structs.replace(machine, digest=digest)
+    numbers = msgspec.json.encode({name: _text(section) for name, section in sections.items()}, order="deterministic")
+    digest = hashlib.sha256(numbers).hexdigest()[:16]
+    return msgspec.structs.replace(machine, provenance=origins, digest=digest)
+
+
+def _text(section: dict[str, Any] | msgspec.Struct) -> msgspec.Raw:
+    """Numbers of a section, by name."""
+    if isinstance(section, dict):
+        return msgspec.Raw(msgspec.json.encode(section, order="deterministic"))
+    return _text(msgspec.to_builtins(section)) if isinstance(section, FixedFunction) else _known_text(section)
+
+
+@lru_cache(1 << 10)
+def _known_text(section: msgspec.Struct) -> msgspec.Raw:
+    return _text(msgspec.to_builtins(section))
 
 
 def _check_keys(table: object, known: list[str], optional: set[str], what: str, file: str) -> None:

@@ -10,14 +10,10 @@ import msgspec.structs
 import numpy as np
 
 
-def plain_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
-    """Numbers of NumPy, and whole floats where an int belongs, as Python's own."""
-    whole = _whole(struct)
-    plain = {key: plain_number(value) for key, value in values.items()}
-    return {
-        key: int(value) if key in whole and isinstance(value, float) and value.is_integer() else value
-        for key, value in plain.items()
-    }
+def whole_numbers(values: dict[str, Any], struct: type[msgspec.Struct]) -> dict[str, Any]:
+    """Values of a section, whole floats where an int belongs as such."""
+    floats = {key: values[key] for key in _whole(struct) if isinstance(values.get(key), float)}
+    return values | {key: int(value) for key, value in floats.items() if value.is_integer()}
 
 
 @cache

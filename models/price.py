@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from tilestamp.models.batch import Batch
 from tilestamp.models.bounds import HOLDS, TERMS, Result
 from tilestamp.models.errors import TilestampError
+from tilestamp.models.fitted import moved as moved_number
 from tilestamp.models.fixed_function import check_pipe, pipe_time
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import Opened, launch_loads
-from tilestamp.models.machine import Machine
+from tilestamp.models.machine import Machine, note_machine
 from tilestamp.models.occupancy import Residency, residency
 from tilestamp.models.timing import Timing
-from tilestamp.models.traffic import Traffic
-from tilestamp.models.used import note
+from tilestamp.models.traffic import Traffic, traffic
+from tilestamp.models.used import collecting
 
 Fidelity = Literal["counts", "bounds", "schedule"]
 FIDELITIES: tuple[Fidelity, ...] = ("counts", "bounds", "schedule")
@@ -73,8 +74,14 @@ def price(
     """
     _check(fidelity)
     batch = Batch(taken([machine]))
-    each = batch.traffic(launches) if moved is None else [[bytes_] for bytes_ in moved]
-    return [_timing(launch, batch, bytes_, fidelity) for launch, bytes_ in zip(launches, each, strict=True)]
+    if moved is None:
+        moved = traffic(launches, batch.machines[0])
+    (machine,) = batch.machines
+    if fidelity == "counts":
+        return [_untimed(launch, bytes_, machine) for launch, bytes_ in zip(launches, moved, strict=True)]
+    bytes_ = np.reshape(moved, (-1, 1, len(Traffic._fields)))
+    rows = batch.prices(launches, bytes_, scheduled=fidelity == "schedule")[:, 0].tolist()
+    return [_timing(*each, machine, fidelity) for each in zip(launches, moved, rows, strict=True)]
 
 
 def prices(
@@ -82,21 +89,22 @@ def prices(
 ) -> Times:
     """Price the launches of one frame on many machines (from ``taken``), as arrays; errors as of ``price``."""
     _check(fidelity)
-    batch, shape = Batch(machines), (len(machines), len(launches))
-    times = no_times(shape, "none")
+    batch = Batch(machines)
+    times = no_times((len(machines), len(launches)), "none")
     if fidelity == "counts":
         return times
-    for place, (launch, moved) in enumerate(zip(launches, batch.traffic(launches), strict=True)):
-        if isinstance(launch, Launch):
-            rows = batch.prices(launch, moved, scheduled=fidelity == "schedule")
-            found = rows[:, ENDS].T / batch.clock_hz * 1e3
-            times.bounds[batch.order, place] = np.array(HOLDS)[rows[:, Result.BOUND].astype(np.intp)]
-        else:
-            passes = [pipe_time(launch, machine, bytes_) for machine, bytes_ in zip(batch.machines, moved, strict=True)]
-            found = np.array([(each.milliseconds, each.low, each.high) for each in passes]).reshape(-1, 3).T
-            times.bounds[batch.order, place] = [each.bound for each in passes]
-        for into, values in zip(times[:3], found, strict=True):
-            into[batch.order, place] = values
+    moved = batch.traffic(launches)
+    rows = batch.prices(launches, moved, scheduled=fidelity == "schedule").swapaxes(0, 1)
+    for into, column in zip(times, ENDS, strict=False):
+        into[batch.order] = rows[:, :, column] / batch.clock_hz[:, np.newaxis] * 1e3
+    times.bounds[batch.order] = np.array(HOLDS)[rows[:, :, Result.BOUND].astype(np.intp)]
+    for place, launch in enumerate(launches):
+        if isinstance(launch, PipeLaunch):
+            for which, machine, bytes_ in zip(batch.order, batch.machines, moved[place].tolist(), strict=True):
+                found = pipe_time(launch, machine, Traffic(*bytes_))
+                for into, value in zip(times[:3], (found.milliseconds, found.low, found.high), strict=True):
+                    into[which, place] = value
+                times.bounds[which, place] = found.bound
     return times
 
 
@@ -112,7 +120,7 @@ def opened(launch: Launch, machine: Machine, moved: Traffic) -> Opened:
     ``models.schedule.play`` works the loads off; parameters and errors as of ``price``.
     """
     batch = Batch([machine])
-    return launch_loads(launch, batch.numbers[0], batch.facts(launch, [moved])[0])
+    return launch_loads(launch, batch.numbers[0], batch.facts([launch], np.array([[moved]]))[0, 0])
 
 
 def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> None:
@@ -125,7 +133,7 @@ def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> N
     """
     for launch in launches:
         if isinstance(launch, Launch):
-            residency(machine, launch.block, launch.registers, launch.shared_bytes)
+            _held(launch, machine)
         else:
             check_pipe(launch, machine)
 
@@ -133,8 +141,8 @@ def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> N
 def taken(machines: Sequence[Machine]) -> list[Machine]:
     """Note that prices are made on machines, and take their fitted numbers as they are moved now."""
     for machine in machines:
-        note("machines", machine.name, machine.digest)
-    return [machine.as_moved for machine in machines]
+        note_machine(machine)
+    return [machine.as_moved for machine in machines] if moved_number() or collecting() else list(machines)
 
 
 def _check(fidelity: str) -> None:
@@ -142,15 +150,13 @@ def _check(fidelity: str) -> None:
         raise TilestampError(f"no fidelity {fidelity!r}; there are {', '.join(FIDELITIES)}")
 
 
-def _timing(launch: Launch | PipeLaunch, batch: Batch, moved: Sequence[Traffic], fidelity: Fidelity) -> Timing:
-    """Price one launch on the only machine of a batch."""
-    (machine,), (bytes_,) = batch.machines, moved
+def _timing(
+    launch: Launch | PipeLaunch, bytes_: Traffic, row: list[float], machine: Machine, fidelity: Fidelity
+) -> Timing:
+    """What is to be said of a launch, by its row of prices."""
     if isinstance(launch, PipeLaunch):
-        return pipe_time(launch, machine, bytes_) if fidelity != "counts" else _untimed(launch, bytes_, 0.0)
-    held = residency(machine, launch.block, launch.registers, launch.shared_bytes)
-    if fidelity == "counts":
-        return _untimed(launch, bytes_, held.occupancy)
-    row = batch.prices(launch, moved, scheduled=fidelity == "schedule")[0].tolist()
+        return pipe_time(launch, machine, bytes_)
+    held = _held(launch, machine)
     cycles, low, high = (row[place] for place in ENDS)
     clock_hz = machine.clock_hz
     details = {"resident_blocks": float(held.blocks)}
@@ -181,10 +187,16 @@ def _achieved(launch: Launch, machine: Machine, units: float, held: Residency) -
     return min(held.occupancy, units * warps / machine.sm.max_warps)
 
 
-def _untimed(launch: Launch | PipeLaunch, moved: Traffic, occupancy: float) -> Timing:
+def _untimed(launch: Launch | PipeLaunch, moved: Traffic, machine: Machine) -> Timing:
     """Everything but time."""
+    occupancy = _held(launch, machine).occupancy if isinstance(launch, Launch) else 0.0
     totals = moved.dram_bytes, moved.l2_bytes
     return Timing(launch.stage, launch.kernel, {}, NAN, NAN, "none", occupancy, *totals, fidelity="counts")
+
+
+def _held(launch: Launch, machine: Machine) -> Residency:
+    """What an SM holds of a launch; errors as of ``residency``."""
+    return residency(machine, launch.block, launch.registers, launch.shared_bytes)
 
 
 def _steps(launch: Launch, machine: Machine, held: Residency) -> str:

@@ -43,7 +43,7 @@ from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
 from tilestamp.models.demand import IN_THE_WAY, Demand
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
-from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of
+from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of, total
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.partition import partitioned
 from tilestamp.models.turns import at_least, in_turn, rest_of
@@ -52,19 +52,21 @@ EXCESS = 1.15  # times the largest term: from here on balance or tail is what ho
 
 
 class Loads(NamedTuple):
-    """What the units of a launch load the machine with; arrays have a row a unit, in cycles.
+    """What the units of a launch load the machine with; arrays of costs have a row a kind of unit, in cycles.
 
     Parameters
     ----------
-    sm : ndarray, (units,)
+    which : ndarray, (units,)
+        Kind of each unit (``models.kinds``).
+    sm : ndarray, (kinds,)
         Of its SM.
-    own : ndarray, (units,)
+    own : ndarray, (kinds,)
         Of the schedulers that it has a warp on; as ``sm`` where it has one on each, or where something else is fuller.
-    alone : ndarray, (units,)
+    alone : ndarray, (kinds,)
         What it takes by itself.
-    draws : ndarray, (units,)
+    draws : ndarray, (kinds,)
         Of the fullest atomic unit, where units are drawn from a queue; else of length 0.
-    moves : ndarray, (units,)
+    moves : ndarray, (kinds,)
         Of the fuller of DRAM and L2, where units are blocks of the grid; else of length 0.
     places : int
         Units that the machine holds together.
@@ -82,6 +84,7 @@ class Loads(NamedTuple):
         As in ``Launch``.
     """
 
+    which: NDArray[np.uint32]
     sm: NDArray[np.float64]
     own: NDArray[np.float64]
     alone: NDArray[np.float64]
@@ -134,59 +137,54 @@ def load_units(units: Demand, sm: Any, own: Any, alone: Any) -> None:
 
 @kernel
 def loads(
-    launch: Shape, units: Any, requests: Any, sizes: Any, terms: Any, way: float, machine: Any, facts: Any
+    launch: Shape, which: Any, costs: Any, amounts: Any, terms: Any, way: float, machine: Any, facts: Any
 ) -> Loads:
     """What the units of a launch load the machine with.
 
     Parameters
     ----------
     launch : Shape
-    units : tuple of three ndarrays, (units,)
+    which : ndarray, (units,)
+    costs : tuple of three ndarrays, (kinds,)
         ``Loads.sm``, ``Loads.own`` and ``Loads.alone``.
-    requests, sizes : ndarray, (units,)
-        Atomic requests; bytes loaded and stored.
+    amounts : ndarray, (kinds,)
+        Of what serves all units one after another: atomic requests where they are drawn from a queue, else bytes.
     terms : ndarray, (len(Term),)
     way : float
         The shortest chain.
     machine : ndarray, (len(Number),)
     facts : ndarray, (len(Fact),)
     """
-    count, (sm, own, alone) = launch.units, units
+    count, (sm, own, alone), nothing = launch.units, costs, np.empty(0)
+    serves = terms[Term.QUEUE] if launch.drawn else max(terms[Term.DRAM], terms[Term.L2])
+    shares = _shares(amounts, which, serves)
     places, sms = places_of(launch, machine, facts)
     start = machine[M.LATENCY_BLOCK_LAUNCH_CYCLES] if count else 0.0
     memory = max(terms[Term.DRAM], terms[Term.L2])
-    if not launch.drawn:
-        atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
-        moves = _shares(sizes, memory)
-        slower = 1.0 if launch.loop else machine[M.MEMORY_LOADED_LATENCY]  # a loop has its share of memory all along
-        pace = Pace(terms[Term.START] / max(1, count), start, slower)
-        if launch.loop:
-            sm, own, alone = at_least(sm, sms * moves), at_least(own, sms * moves), at_least(alone, sms * moves)
-        return Loads(
-            sm, own, alone, np.empty(0), moves, places, sms, pace, 0.0, memory, atomic, way, launch.loop
-        )  # fmt: skip
-    draws = _shares(requests, terms[Term.QUEUE])
-    pace = Pace(0.0, 0.0, 1.0)
-    return Loads(
-        sm, own, alone, draws, np.empty(0), places, sms, pace, start, memory, terms[Term.ATOMIC], way, launch.loop
-    )  # fmt: skip
+    if launch.drawn:
+        pace, atomic = Pace(0.0, 0.0, 1.0), terms[Term.ATOMIC]
+        return Loads(which, sm, own, alone, shares, nothing, places, sms, pace, start, memory, atomic, way, launch.loop)
+    atomic = max(terms[Term.ATOMIC], terms[Term.QUEUE])
+    slower = 1.0 if launch.loop else machine[M.MEMORY_LOADED_LATENCY]  # a loop has its share of memory all along
+    pace = Pace(terms[Term.START] / max(1, count), start, slower)
+    if launch.loop:
+        sm, own, alone = at_least(sm, sms * shares), at_least(own, sms * shares), at_least(alone, sms * shares)
+    return Loads(which, sm, own, alone, nothing, shares, places, sms, pace, 0.0, memory, atomic, way, launch.loop)
 
 
 @kernel
-def _shares(amounts: Any, cycles: float) -> Any:
-    """Deal cycles to units by their amounts; alike where all are 0."""
-    total = amounts.sum()
-    return amounts * (cycles / total) if total > 0 else np.full(len(amounts), cycles / max(1, len(amounts)))
+def _shares(amounts: Any, which: Any, cycles: float) -> Any:
+    """Deal cycles to units by their amounts, (kinds,); alike where all are 0."""
+    whole = total(amounts, which)
+    return amounts * (cycles / whole) if whole > 0 else np.full(len(amounts), cycles / max(1, len(which)))
 
 
 @kernel
 def play(units: Loads) -> Played:
     """Work the units off."""
-    own = served = 0.0
-    for i in range(len(units.sm)):
-        own += units.alone[i]
-        served += units.sm[i]
-    mean, served = own / max(1, len(units.sm)), served / units.sms
+    count = len(units.which)
+    own, work = total(units.alone, units.which), total(units.sm, units.which)
+    mean, served = own / max(1, count), work / units.sms
     crowded, more = crowd(units)
     end, started, held = ends(units, crowded, units.places, record_of(0))
     waited = end * more / (own + more) if more else 0.0
@@ -203,36 +201,34 @@ def play(units: Loads) -> Played:
 @kernel
 def ends(units: Loads, alone: Any, places: int, record: Record) -> tuple[float, float, float]:
     """``list_schedule`` of what the units load the machine with."""
-    loads = units.sm, alone, units.draws, units.moves
+    loads = units.which, units.sm, alone, units.draws, units.moves
     return list_schedule(*loads, places, units.sms, units.pace, record)  # type: ignore[no-any-return]
 
 
 @kernel
 def crowd(units: Loads) -> tuple[Any, float]:
-    """What each unit takes by itself and waits for its neighbours, (units,), and the cycles that all wait."""
-    if min(len(units.sm), units.places) <= units.sms:
+    """What a unit of each kind takes by itself and waits for its neighbours, (kinds,), and the cycles that all wait."""
+    count = len(units.which)
+    if min(count, units.places) <= units.sms:
         return units.alone, 0.0
-    crowded, waited = np.empty(len(units.sm)), 0.0
     rest = rest_of(units.sm, units.places, units.sms) if units.loop else np.empty(0)
-    beside = min(len(units.sm), units.places) / units.sms - 1.0
-    others = beside * units.sm.sum() / units.alone.sum()
-    work = 0.0 if units.loop else _neighbours(units)
-    for i in range(len(units.sm)):
-        wait = in_turn(units.own[i], units.alone[i], rest[i], others) if units.loop else min(units.own[i], work)
-        wait *= IN_THE_WAY
-        crowded[i] = units.alone[i] + wait
-        waited += wait
-    return crowded, waited
+    beside = min(count, units.places) / units.sms - 1.0
+    work, own = total(units.sm, units.which), total(units.alone, units.which)
+    others = beside * work / own
+    waits, near = np.empty(len(units.sm)), 0.0 if units.loop else _neighbours(units, work)
+    for i in range(len(waits)):
+        wait = in_turn(units.own[i], units.alone[i], rest[i], others) if units.loop else min(units.own[i], near)
+        waits[i] = wait * IN_THE_WAY
+    return units.alone + waits, total(waits, units.which)
 
 
 @kernel
-def _neighbours(units: Loads) -> float:
+def _neighbours(units: Loads, work: float) -> float:
     """Work of a unit's neighbours on its SM; of more than the longest unit's own it does not matter how much."""
-    count, sms = len(units.sm), units.sms
-    most, work = units.own.max(), units.sm.sum()
+    count, sms, most = len(units.which), units.sms, units.own.max()
     if work >= sms * (units.sm.max() + most):
         return most  # type: ignore[no-any-return]
-    return partitioned(units.sm, count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
+    return partitioned(units.sm[units.which], count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
 
 
 @kernel
@@ -244,7 +240,7 @@ def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, r
     row[Result.LOW] = before + max(least, together(units, played, units.begun + played.low, 0.0))
     row[Result.HIGH] = before + max(least, together(units, played, units.begun + played.high, 1.0))
     row[Result.TAIL_CYCLES] = max(0.0, cycles - units.begun - played.started)
-    busy = min(len(units.sm), units.sms)
+    busy = min(len(units.which), units.sms)
     row[Result.BUSY_SMS] = busy
     if len(units.draws):  # by blocks that stay until all is drawn
         row[Result.HELD] = units.places / units.sms

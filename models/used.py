@@ -9,6 +9,11 @@ FITTED, CHOSEN = "fitted numbers", "chosen inputs"
 _collecting: list[Used] = []
 
 
+def collecting() -> bool:
+    """Whether anybody collects."""
+    return bool(_collecting)
+
+
 def note(kind: str, name: str, digest: str) -> None:
     """Say that something is used now."""
     for found in _collecting:

@@ -1,6 +1,6 @@
 """Prices: what one run takes on many machines, an array row a machine, a column a launch."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.models.occupancy import holding_of
 from tilestamp.models.price import Fidelity, Times, check_prices, no_times, prices, taken
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.work import FixedFunctionWork, Work
@@ -122,22 +123,32 @@ def prices_of(
     """
     groups: dict[int, tuple[Launches, list[int]]] = {}
     refusals: dict[int, str] = {}
+    known: dict[Hashable, Launches] = {}
     for place, machine in enumerate(machines):
         try:
-            launches = launches_on(machine)
-            check_prices(launches, machine)
+            key = _launching(machine)
+            if key not in known:
+                launches = launches_on(machine)
+                check_prices(launches, machine)
+                known[key] = launches
         except TilestampError as error:
             if not skip:
                 raise
             refusals[place] = str(error)
         else:
-            groups.setdefault(id(launches), (launches, []))[1].append(place)
+            groups.setdefault(id(known[key]), (known[key], []))[1].append(place)
     shape = len(machines), len(works)
     times = no_times(shape, "")
     for launches, places in groups.values():
         _fill(times, launches, [machines[place] for place in places], np.array(places), fidelity)
     stages, kernels = tuple(work.stage for work in works), tuple(work.kernel for work in works)
     return Prices(tuple(machines), stages, kernels, *times, refusals)
+
+
+def _launching(machine: Machine) -> Hashable:
+    """All of a machine that its launches, and whether they have a price there, depend on."""
+    pipe = machine.fixed_function
+    return machine.simt, machine.compute_capability, holding_of(machine), pipe and tuple(pipe.per_clock)
 
 
 def _fill(

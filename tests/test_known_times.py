@@ -16,6 +16,11 @@ H200 = load_machine("h200")
 NOTHING = Traffic(0.0, 0.0, 1.0)
 
 
+def each(units):
+    """Kinds of units of which each is one."""
+    return np.arange(units, dtype=np.uint32)
+
+
 @settings(deadline=None, max_examples=60)
 @given(
     seed=st.integers(0, 10**6),
@@ -44,6 +49,7 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
         free, served = sorted(free), sorted(served)
     nothing = np.empty(0)
     got = list_schedule(
+        each(units),
         sm,
         alone,
         draws if queue else nothing,
@@ -59,7 +65,7 @@ def test_the_list_schedule_is_that_of_sorted_lists(seed, units, places, sms, que
 def test_what_could_not_start_while_places_were_taken_does_not_start_at_once_later():
     """One place: a block of 10 from 0 on, then empty blocks at 10, 11, 12 and 13."""
     nothing, alone = np.zeros(5), np.array([10.0, 0.0, 0.0, 0.0, 0.0])
-    found = list_schedule(nothing, alone, np.empty(0), np.empty(0), 1, 1, Pace(1.0, 0.0, 1.0), record_of(0))
+    found = list_schedule(each(5), nothing, alone, np.empty(0), np.empty(0), 1, 1, Pace(1.0, 0.0, 1.0), record_of(0))
     assert found[0] == 13.0
 
 
@@ -69,14 +75,14 @@ def test_a_block_that_waited_goes_more_slowly_while_memory_is_busy(busy, end):
     nothing, alone, moves = np.zeros(2), np.array([0.0, 10.0]), np.array([0.0, busy])
     for places, expected in ((1, end), (2, max(10.0, busy))):
         pace = Pace(0.0, 0.0, 3.0)
-        found = list_schedule(nothing, alone, np.empty(0), moves, places, places, pace, record_of(0))
+        found = list_schedule(each(2), nothing, alone, np.empty(0), moves, places, places, pace, record_of(0))
         assert found[0] == pytest.approx(expected)
 
 
 def test_a_block_holds_its_place_while_memory_serves_it():
     """Two places: blocks that would take 1 cycle each, served for 4 cycles one after another."""
     ones, served = np.ones(2), np.array([4.0, 4.0])
-    found = list_schedule(np.zeros(2), ones, np.empty(0), served, 2, 2, Pace(0.0, 0.0, 1.0), record_of(0))
+    found = list_schedule(each(2), np.zeros(2), ones, np.empty(0), served, 2, 2, Pace(0.0, 0.0, 1.0), record_of(0))
     assert found[2] == 4.0 + 8.0
 
 
