@@ -57,6 +57,19 @@ def _lowest_bit(bits):  # type: ignore[no-untyped-def]
     return (lambda bits: _llvm_lowest_bit(bits)) if bits == types.uint64 else None  # noqa: PLW0108 - numba needs a function
 
 
+@kernel(lent=True)
+def lowest_bits(bits: Any, count: int) -> Any:
+    """The lowest ``count`` set bits of a uint64; all of them where it has no more."""
+    if popcount(bits) <= count:
+        return bits
+    below, step = np.uint64(0), np.uint64(32)
+    while step != np.uint64(0):
+        further = (np.uint64(1) << (below + step)) - np.uint64(1)
+        below += step if popcount(bits & further) <= count else np.uint64(0)
+        step >>= np.uint64(1)
+    return bits & ((np.uint64(1) << below) - np.uint64(1))
+
+
 def _near(addresses: Any, first: int, here: Any, size: Any) -> Any:
     """Which of eight lanes from ``first`` on differ from an address in no bit but those below ``size``."""
     return sum(int(0 <= (int(addresses[first + i]) ^ int(here)) < size) << i for i in range(LANES))

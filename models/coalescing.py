@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from tilestamp.models.bits import active_lanes, lanes_near, lowest_bit
+from tilestamp.models.bits import active_lanes, lanes_near, lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Coalescing
 
@@ -59,14 +59,12 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     -------
     count, bytes : int
     """
-    request, segment = lanes, SECTOR_BYTES
+    request, segment = lanes, smallest_transaction_bytes(rule)
     shrink = rule == HALF_WARP_SEGMENTS
     if shrink:
         request, segment = HALF_WARP, min(SEGMENT_BYTES, SECTOR_BYTES * access_bytes)
-    elif rule == WARP_LINES:
-        segment = SEGMENT_BYTES
-        if access_bytes > WORD_BYTES:
-            request = max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
+    elif rule == WARP_LINES and access_bytes > WORD_BYTES:
+        request = _lanes_of_a_line(access_bytes)
     rising = 0 if shrink else _rising_segments(addresses, lanes, request, segment)
     if rising > 0:
         return rising, rising * segment
@@ -77,6 +75,46 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
         count += n
         total += b
     return count, total
+
+
+@kernel(lent=True)
+def transactions_of_runs(addresses: Any, starts: Any, lanes: int, access_bytes: int, rule: int) -> tuple[int, int]:
+    """``transactions`` where runs of lanes access one address each.
+
+    Parameters
+    ----------
+    addresses : ndarray, (>= lanes,), int64
+        Of the first lane of each run, none inactive; the others' are written where they are needed.
+    starts : uint64
+        Bit i: a run starts at lane i; bit 0 is set.
+    lanes, access_bytes, rule : int
+        As of ``transactions``.
+    """
+    segment = smallest_transaction_bytes(rule)
+    first, last, falls, rest = np.uint64(0), np.int64(-1), rule == HALF_WARP_SEGMENTS, starts
+    while rest != np.uint64(0):
+        here = addresses[lowest_bit(rest)] & -segment
+        falls |= here < last
+        first |= (rest & (~rest + np.uint64(1))) if here != last else np.uint64(0)
+        rest &= rest - np.uint64(1)
+        last = here
+    if not falls:
+        if rule == WARP_LINES and access_bytes > WORD_BYTES:
+            for lane in range(0, lanes, _lanes_of_a_line(access_bytes)):
+                first |= np.uint64(1) << np.uint64(lane)
+        count = popcount(first)
+        return count, count * segment
+    for lane in range(1, lanes):
+        if not (starts >> np.uint64(lane)) & np.uint64(1):
+            addresses[lane] = addresses[lane - 1]
+    found: tuple[int, int] = transactions(addresses, lanes, access_bytes, rule)
+    return found
+
+
+@kernel(lent=True)
+def _lanes_of_a_line(access_bytes: int) -> int:
+    """Lanes of one request where a word is wider than 4 bytes, and a line is all that a request can take."""
+    return max(1, 2 * HALF_WARP * WORD_BYTES // access_bytes)
 
 
 @kernel(lent=True)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models.bits import active_lanes, lanes_near
+from tilestamp.models.bits import active_lanes, lanes_near, lowest_bits
 from tilestamp.simulator.stages.zhang2025.fine_tile import coverage
 from tilestamp.simulator.stages.zhang2025.stepped_tile import stepped_tile
 
@@ -28,6 +28,13 @@ def test_lanes_are_near_in_one_aligned_segment(addresses, here, size, data):
 @given(LANES)
 def test_lanes_with_an_address_are_active(addresses):
     assert active_lanes(np.array(addresses, np.int64), 0, len(addresses)) == bits(a >= 0 for a in addresses)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sets(st.integers(0, 63)), st.integers(0, 64))
+def test_the_lowest_bits_are_the_first_that_are_set(places, count):
+    wanted = sum(1 << i for i in sorted(places)[:count])
+    assert lowest_bits(np.uint64(sum(1 << i for i in places)), count) == wanted
 
 
 @pytest.mark.parametrize("seed", range(20))

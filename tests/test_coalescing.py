@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tilestamp.models.coalescing import contiguous, touched_lines, transactions
+from tilestamp.models.coalescing import contiguous, touched_lines, transactions, transactions_of_runs
 from tilestamp.models.simt import Coalescing
 
 SEGMENTS, LINES, SECTORS = (int(rule) for rule in Coalescing)
@@ -117,3 +117,20 @@ def test_lines_that_a_warp_touches(step, lines):
 
 def test_idle_lanes_touch_no_line():
     assert touched_lines(np.full(32, -1, np.int64), 32) == 0
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 40), st.integers(1, 6)), min_size=1, max_size=10),
+    st.booleans(),
+    st.sampled_from([(4, 4), (8, 16), (16, 16), (64, 16)]),
+    st.sampled_from([SEGMENTS, LINES, SECTORS]),
+)
+@settings(max_examples=150, derandomize=True, deadline=None)
+def test_runs_of_lanes_at_one_address_need_what_their_lanes_need(runs, rising, sizes, rule):
+    step, size = sizes
+    lanes = [i for i, n in (sorted(runs) if rising else runs) for _ in range(n)]
+    starts = sum(1 << i for i in range(len(lanes)) if i == 0 or lanes[i] != lanes[i - 1])
+    addresses = np.array(lanes, np.int64) * step
+    at_starts = np.array([a if starts >> i & 1 else -7 for i, a in enumerate(addresses)], np.int64)
+    found = transactions_of_runs(at_starts, np.uint64(starts), len(lanes), size, rule)
+    assert found == transactions(addresses, len(lanes), size, rule)

@@ -38,9 +38,7 @@ def header(a, b, c):
     return None if area == 0 else np.array([*a, *(b if area > 0 else c), *(c if area > 0 else b)], np.int16)
 
 
-@given(point, point, point)
-@settings(max_examples=60, derandomize=True, deadline=None)
-def test_pixel_mask_is_the_edge_predicate(a, b, c):
+def check_mask(a, b, c):
     corners = header(a, b, c)
     if corners is None:
         return
@@ -49,6 +47,18 @@ def test_pixel_mask_is_the_edge_predicate(a, b, c):
     for j in range(8):
         for i in range(8):
             assert (mask >> (8 * j + 7 - i)) & 1 == naive.covers(points, 16 * i + 8, 16 * j + 8)
+
+
+@given(point, point, point)
+@settings(max_examples=60, derandomize=True, deadline=None)
+def test_pixel_mask_is_the_edge_predicate(a, b, c):
+    check_mask(a, b, c)
+
+
+@given(point, st.tuples(st.integers(-16000, 16000), st.integers(-16000, 16000)), point)
+@settings(max_examples=60, derandomize=True, deadline=None)
+def test_pixel_mask_of_a_long_edge_through_the_tile_is_the_edge_predicate(middle, along, c):
+    check_mask(*((middle[0] + s * along[0], middle[1] + s * along[1]) for s in (-1, 1)), c)
 
 
 @given(point, point, point, st.sampled_from([1, 2, 3]))

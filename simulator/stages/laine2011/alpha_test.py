@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bits import lowest_bit
+from tilestamp.models.bits import lowest_bit, lowest_bits, popcount
 from tilestamp.models.counters import counters_of, ratio, shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
@@ -40,7 +40,12 @@ from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     update_zmax,
 )
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
-from tilestamp.simulator.stages.laine2011.fine_raster_single import count_reads, draw_fragment
+from tilestamp.simulator.stages.laine2011.fine_raster_single import (
+    add_hits,
+    count_reads,
+    draw_nearer,
+    remember_depths,
+)
 from tilestamp.simulator.stages.laine2011.fine_raster_work import fine_work
 from tilestamp.simulator.stages.laine2011.frame_buffers import (
     FrameBuffers,
@@ -143,21 +148,21 @@ def _draw_round(
     setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, line: int, reference: int, row: Any
 ) -> Any:
     """Test and write up to 32 fragments in order; returns how many survive, their slots in ``tile.mask``."""
-    state, n, kept, alive, writes, longest, hit = tile.state, 0, 0, 0, 0, 0, np.uint64(0)
+    state, n, kept, alive, writes, longest = tile.state, 0, 0, 0, 0, 0
     row[FineRasterEvent.TAG_LANES] += min(state[TAIL] - state[HEAD], WARP)
+    remember_depths(tile)
     while n < WARP and state[HEAD] < state[TAIL]:
-        slot, mask = tile.slots[state[HEAD]], tile.masks[state[HEAD]]
-        record = np.int64(setup.records[slot])
-        plane = setup.planes[record]
-        while n < WARP and mask != np.uint64(0):
+        slot = tile.slots[state[HEAD]]
+        record, mask = np.int64(setup.records[slot]), lowest_bits(tile.masks[state[HEAD]], WARP - n)
+        tile.masks[state[HEAD]] ^= mask
+        state[HEAD] += tile.masks[state[HEAD]] == np.uint64(0)
+        plane, opaque = setup.planes[record], np.uint64(0)
+        while mask != np.uint64(0):
             p = lowest_bit(mask)
             bit = mask & (~mask + np.uint64(1))
             mask ^= bit
             x, y = column + 7 - (p & 7), line + (p >> 3)
             depth = (np.int64(plane[0]) * x + np.int64(plane[1]) * y + np.int64(plane[2])) & _LOW
-            if hit & bit == np.uint64(0):
-                tile.before[p], tile.chain[p] = tile.depth[p], 0
-                hit |= bit
             tile.slot[n] = slot
             n += 1
             if depth >= tile.before[p]:
@@ -168,12 +173,10 @@ def _draw_round(
                 continue
             tile.mask[alive] = slot
             alive += 1
-            written = draw_fragment(setup, colors, draw, tile, record, p, depth, x, y)
-            writes += written
-            tile.chain[p] += written
-            longest = max(longest, tile.chain[p])
-        tile.masks[state[HEAD]] = mask
-        state[HEAD] += mask == np.uint64(0)
+            opaque |= bit
+        _, written = draw_nearer(draw, tile, plane, record, opaque, column, line, None)
+        writes += popcount(written)
+        longest = add_hits(tile.more, longest, written)
     state[FRAGMENTS] -= n
     _count_round(setup, draw, tile, n, kept, alive, row)
     if alive > 0:

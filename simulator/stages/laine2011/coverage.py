@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.exact import tile_bits
+from tilestamp.simulator.stages.laine2011.tile_pixels import inside
 
 TILE = 8  # pixels
-_FAR = 1 << 30
 _EDGE_0, _EDGE_1, _EDGE_2 = np.int64(0), np.int64(1), np.int64(2)  # a kernel is compiled anew for each literal
 SAMPLE_COLUMN = np.array([[0] * 8, [0, 1] + [0] * 6, [1, 3, 0, 2] + [0] * 4, [7, 2, 4, 0, 6, 3, 1, 5]])
 """Column of the sample in each row of the pixel, by log2 of the samples."""
@@ -48,31 +47,13 @@ def pixel_mask(header: Any, left: int, bottom: int) -> Any:
     -------
     uint64
     """
-    return _mask(header, left, bottom, 0)
+    return inside(header, left + 8, bottom + 8, 0)
 
 
 @kernel(lent=True)
 def square_mask(header: Any, left: int, bottom: int) -> Any:
     """Pixels whose square may be touched: the conservative mask of several samples a pixel."""
-    return _mask(header, left, bottom, 8)
-
-
-@kernel(lent=True)
-def _mask(header: Any, left: int, bottom: int, margin: int) -> Any:
-    """Mask of a tile's pixels, with every edge moved outwards by ``margin`` in both axes."""
-    x, y = left + 8, bottom + 8
-    a = _edge(header, _EDGE_0, x, y, margin)
-    b = _edge(header, _EDGE_1, x, y, margin)
-    c = _edge(header, _EDGE_2, x, y, margin)
-    return tile_bits(a, b, c)
-
-
-@kernel(lent=True)
-def _edge(header: Any, k: int, x: int, y: int, margin: int) -> Any:
-    """An edge from pixel to pixel: beyond 2**30 no step in a tile changes the sign, and 32 bits hold the rest."""
-    value, dx, dy = _first_value(header, k, x, y)
-    value += margin * (abs(dx) + abs(dy))
-    return min(max(value, -_FAR), _FAR), 16 * dy, 16 * dx
+    return inside(header, left + 8, bottom + 8, 8)
 
 
 @kernel(lent=True)

@@ -1,4 +1,4 @@
-"""Arithmetic that CUDA has and Python lacks: one-rounding float32 fma, saturating conversions, coverage bits.
+"""Arithmetic that CUDA has and Python lacks: one-rounding float32 fma, saturating conversions.
 
 Each function is plain Python first, so that the kernels also run interpreted; compiled code gets the machine's own
 instruction through an overload.
@@ -65,57 +65,6 @@ def _fma64(a, b, c):  # type: ignore[no-untyped-def]
     if a == b == c == types.float64:
         return lambda a, b, c: _llvm_fma64(a, b, c)  # noqa: PLW0108 - numba needs a function
     return None
-
-
-def tile_bits(a: Any, b: Any, c: Any) -> Any:
-    """Pixels of a tile of 8 x 8 at which none of three edge functions is negative, as a uint64.
-
-    Parameters
-    ----------
-    a, b, c : tuple of int
-        Of each edge: its value at the lower left pixel, what a step right takes from it, and what a step up adds. All
-        sums are within int32.
-
-    Returns
-    -------
-    uint64
-        Pixel (x, y) at bit 8 * y + 7 - x.
-    """
-    edges = [tuple(map(int, edge)) for edge in (a, b, c)]
-    pixels = [(x, y) for y in range(8) for x in reversed(range(8))]
-    inside = [all(start - right * x + up * y >= 0 for start, right, up in edges) for x, y in pixels]
-    return np.uint64(sum(1 << i for i, is_inside in enumerate(inside) if is_inside))
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _llvm_tile_bits(_context: Any, a: Any, b: Any, c: Any) -> Any:
-    from llvmlite import ir
-
-    lane, row = ir.IntType(32), ir.VectorType(ir.IntType(32), 8)
-
-    def spread(builder: Any, value: Any) -> Any:
-        one = builder.insert_element(ir.Constant(row, ir.Undefined), builder.trunc(value, lane), ir.Constant(lane, 0))
-        return builder.shuffle_vector(one, ir.Constant(row, ir.Undefined), ir.Constant(row, [0] * 8))
-
-    def codegen(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        columns, word = ir.Constant(row, list(reversed(range(8)))), ir.IntType(64)
-        edges = [[spread(builder, builder.extract_value(edge, i)) for i in range(3)] for edge in args]
-        values = [builder.sub(start, builder.mul(right, columns)) for start, right, _ in edges]
-        bits = ir.Constant(word, 0)
-        for y in range(8):
-            signs = builder.or_(builder.or_(values[0], values[1]), values[2])
-            inside = builder.icmp_signed(">=", signs, ir.Constant(row, [0] * 8))
-            eight = builder.zext(builder.bitcast(inside, ir.IntType(8)), word)
-            bits = builder.or_(bits, builder.shl(eight, ir.Constant(word, 8 * y)))
-            values = [builder.add(value, up) for value, (_, _, up) in zip(values, edges, strict=True)]
-        return bits
-
-    return types.uint64(a, b, c), codegen
-
-
-@overload(tile_bits)
-def _tile_bits(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
-    return lambda a, b, c: _llvm_tile_bits(a, b, c)  # noqa: PLW0108 - numba needs a function
 
 
 @kernel(error_model="numpy", lent=True)

@@ -12,6 +12,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import pixel_mask, square_mask
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.stages.prefetch import prefetch
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 
 TILE = 8  # pixels
@@ -21,6 +22,7 @@ QUEUE = 64  # triangles with fragments left
 WARP = 32
 ENTRY_BYTES = 4
 HEADER_BYTES = 16
+_AHEAD = 16  # entries, that memory is asked for before it is read
 
 
 @shown(*SAMPLE_COUNTERS, distribution("triangles", "ENTRY_LANES", "triangles in the list of a tile that has some"))
@@ -91,13 +93,15 @@ class Draw(NamedTuple):
 class Tile(NamedTuple):
     """Scratch of one warp; pixel p of the tile is bit p of a coverage mask, its sample i at p + 64 * i."""
 
-    depth: np.ndarray  # (samples * 64,) int64
-    color: np.ndarray  # (samples * 64,) int64, RGBA from the low byte up
-    owner: np.ndarray  # (samples * 64,) int64: record of the last write, -1 where there was none
-    zmax: np.ndarray  # (64,) int64: farthest sample of a pixel, several samples only; or the layer before
-    before: np.ndarray  # (64,) int64: depth of a pixel before the round, where the round has hit it, and ...
-    chain: np.ndarray  # (64,) int64: ... how often
+    depth: np.ndarray  # (samples * 64,) uint32
+    color: np.ndarray  # (samples * 64,) uint32, RGBA from the low byte up
+    owner: np.ndarray  # (samples * 64,) int32: record of the last write, -1 where there was none
+    zmax: np.ndarray  # (64,) uint32: farthest sample of a pixel, several samples only; or the layer before
+    before: np.ndarray  # (64,) uint32: depths before a round
+    chain: np.ndarray  # (64,) int64: how often a round has hit a pixel
+    more: np.ndarray  # (32,) uint64: pixels that a round has hit more than i times
     slots: np.ndarray  # (96,) int64: queue of triangles ...
+    records: np.ndarray  # (96,) int64: ... their data records ...
     masks: np.ndarray  # (96,) uint64: ... and the fragments that they have left
     state: np.ndarray  # (7,) int64, see below
     pixel: np.ndarray  # (32,) int64: fragments of a round
@@ -112,10 +116,11 @@ HEAD, TAIL, FRAGMENTS, NEXT, END, ZMAX, UPDATE = range(7)  # columns of Tile.sta
 @kernel
 def new_tile(samples: int) -> Any:
     """Scratch for one warp."""
-    many, i64 = samples * PIXELS, np.int64
+    many, i64, u32, u64 = samples * PIXELS, np.int64, np.uint32, np.uint64
     return Tile(
-        np.empty(many, i64), np.empty(many, i64), np.empty(many, i64), np.empty(PIXELS, i64), np.empty(PIXELS, i64),
-        np.zeros(PIXELS, i64), np.empty(QUEUE + SEGMENT, i64), np.empty(QUEUE + SEGMENT, np.uint64), np.zeros(7, i64),
+        np.empty(many, u32), np.empty(many, u32), np.empty(many, np.int32), np.empty(PIXELS, u32),
+        np.empty(PIXELS, u32), np.zeros(PIXELS, i64), np.empty(WARP, u64), np.empty(QUEUE + SEGMENT, i64),
+        np.empty(QUEUE + SEGMENT, i64), np.empty(QUEUE + SEGMENT, u64), np.zeros(7, i64),
         np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64), np.empty(WARP, i64),
     )  # fmt: skip
 
@@ -159,7 +164,10 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
     killed = fragments = 0
     queued = tail = state[TAIL]
     for k in range(first, last):
-        slot = np.int64(entries[k])
+        slot, ahead = np.int64(entries[k]), np.int64(entries[min(k + _AHEAD, entries.size - 1)])
+        prefetch(setup.misc, ahead)
+        prefetch(setup.headers, ahead)
+        prefetch(setup.records, ahead)
         if row is not None:
             tile.addresses[k - first] = slot * HEADER_BYTES
         if draw.depth and np.int64(setup.misc[slot]) & 0xFFFFF000 >= limit:
@@ -167,7 +175,10 @@ def read_segment(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, 
             continue
         header = setup.headers[slot]
         mask = square_mask(header, left, bottom) if draw.log_samples > 0 else pixel_mask(header, left, bottom)
-        tile.slots[tail], tile.masks[tail] = slot, mask
+        tile.slots[tail], tile.masks[tail], record = slot, mask, np.int64(setup.records[slot])
+        tile.records[tail] = record
+        prefetch(setup.planes, record)
+        prefetch(setup.inputs, record)
         tail += mask != np.uint64(0)
         fragments += popcount(mask)
     state[TAIL] = tail
@@ -199,6 +210,7 @@ def refill(setup: Setup, entries: Any, draw: Draw, tile: Tile, left: int, bottom
     for i in range(queued):
         tile.slots[i] = tile.slots[state[HEAD] + i]
         tile.masks[i] = tile.masks[state[HEAD] + i]
+        tile.records[i] = tile.records[state[HEAD] + i]
     state[HEAD], state[TAIL] = 0, queued
     if row is not None:
         row[FineRasterEvent.REFILLS] += 1

@@ -8,6 +8,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.coverage import SAMPLE_COLUMN
 from tilestamp.simulator.stages.laine2011.exact import wrap_int32
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import Draw
+from tilestamp.simulator.stages.laine2011.lanes import mixed
 
 _W, _U, _V = np.int64(4), np.int64(7), np.int64(10)  # where the planes of 1/w, u/w and v/w begin in a record
 
@@ -16,13 +17,6 @@ _W, _U, _V = np.int64(4), np.int64(7), np.int64(10)  # where the planes of 1/w, 
 def _plane(planes: Any, record: Any, at: Any, x: Any, y: Any) -> Any:
     value = np.int64(planes[record, at]) * x + np.int64(planes[record, at + 1]) * y + np.int64(planes[record, at + 2])
     return np.float32(wrap_int32(value))
-
-
-@kernel(lent=True)
-def _channel(value: Any) -> Any:
-    """Eight bits of a channel in 0..1, rounded to nearest, saturating; NaN is 0."""
-    scaled = np.float64(value) * 255.0 + 0.5
-    return np.int64(min(scaled, 255.0)) if scaled > 0.0 else 0
 
 
 @kernel(error_model="numpy", lent=True)
@@ -52,11 +46,8 @@ def shade(planes: Any, record: int, colors: Any, x: int, y: int, sample: int, dr
         u = w * _plane(planes, record, _U, at_x, at_y)
         v = w * _plane(planes, record, _V, at_x, at_y)
     t = np.float32(1) - u - v
-    i, j, k = planes[record, 13], planes[record, 14], planes[record, 15]
-    packed = np.int64(0)
-    for c in range(4):
-        packed |= _channel(t * colors[i, c] + u * colors[j, c] + v * colors[k, c]) << (8 * c)
-    return packed
+    corners = np.int64(planes[record, 13]), np.int64(planes[record, 14]), np.int64(planes[record, 15])
+    return mixed(colors, corners, (t, u, v))
 
 
 @kernel(lent=True)

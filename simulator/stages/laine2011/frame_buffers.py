@@ -46,19 +46,19 @@ def load_layer(behind: Any, tile: Tile, x: int, y: int) -> None:
 @kernel(lent=True)
 def store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     """Write what a tile has, shaded where its fragments are shaded late."""
-    for sample in range(1 << draw.log_samples):
-        for p in range(PIXELS):
-            at, i, j = p + PIXELS * sample, x + 7 - (p & 7), y + (p >> 3)
-            record, color = tile.owner[at], tile.color[at]
-            if record >= 0:
-                buffers.ids[sample, j, i] = setup.inputs[record]
-                if draw.shade_late:
-                    color = shade(setup.planes, record, colors, i, j, -1, draw)
-            elif draw.clear:
-                buffers.ids[sample, j, i] = -1
-            else:
-                continue
-            buffers.depth[sample, j, i], buffers.color[sample, j, i] = tile.depth[at], color
+    for at in range(PIXELS << draw.log_samples):
+        p = at & (PIXELS - 1)
+        sample, i, j = at // PIXELS, x + 7 - (p & 7), y + (p >> 3)
+        record, color = np.int64(tile.owner[at]), np.int64(tile.color[at])
+        if record >= 0:
+            buffers.ids[sample, j, i] = setup.inputs[record]
+            if draw.shade_late:
+                color = shade(setup.planes, record, colors, i, j, -1, draw)
+        elif draw.clear:
+            buffers.ids[sample, j, i] = -1
+        else:
+            continue
+        buffers.depth[sample, j, i], buffers.color[sample, j, i] = tile.depth[at], color
 
 
 @kernel(lent=True)
