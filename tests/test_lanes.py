@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.laine2011.lanes import below, mixed, write
+from tilestamp.simulator.stages.laine2011.lanes import below, mixed, write, write_reversed
 
 ROWS = [(5, 7), (2**32 - 20, 9), (40, -6), (100, 0), (-3, 1)]  # first, step: some pass zero
 
@@ -17,6 +17,11 @@ def _below(first, step, values, at, or_equal):
 @kernel
 def _write(first, step, values, at, bits):
     write(first, step, values, at, bits)
+
+
+@kernel
+def _write_reversed(values, at, target, i):
+    write_reversed(values, at, target, i)
 
 
 @kernel
@@ -58,3 +63,10 @@ def test_only_numbers_whose_bits_are_set_are_written(first, step, dtype):
     numbers = np.array([first + i * step for i in range(8)]).astype(dtype)
     wanted = [77] * 3 + [n if 0b10100101 >> i & 1 else 77 for i, n in enumerate(numbers)] + [77]
     assert values.tolist() == wanted
+
+
+@pytest.mark.parametrize("dtype", [np.uint32, np.int32])
+def test_eight_numbers_are_written_with_the_last_one_first(dtype):
+    target = np.zeros(11, dtype)
+    _write_reversed(np.arange(20, dtype=dtype), 5, target, 2)
+    assert target.tolist() == [0, 0, 12, 11, 10, 9, 8, 7, 6, 5, 0]

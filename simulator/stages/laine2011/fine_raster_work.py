@@ -33,41 +33,41 @@ def fine_work(
     mode: str,
     words: int = 1,
 ) -> Work:
-    """Work of the kernel, from the rows of all active tiles and the inputs of ``fine_raster``.
+    """Work of the kernel, from the rows of all active tiles, which become its table, and the inputs of ``fine_raster``.
 
     With more ``words`` of colour a pixel than one there are as many warps as shared memory has room for.
     """
     each = WARP_BYTES[samples] + (words - 1) * WORD_BYTES
     warps = min(WARPS, (SHARED_BYTES - TABLE_BYTES) // each)
-    table = _with_starts(rows, warps * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
+    _add_starts(rows, warps * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
     shared = TABLE_BYTES + warps * each + (2**samples if samples > 1 else 0)
-    queue = np.array([DRAW_REQUESTS[release] * table[:, FineRasterEvent.ATOMIC].sum()])
+    queue = np.array([DRAW_REQUESTS[release] * rows[:, FineRasterEvent.ATOMIC].sum()])
     return Work(
         stage="fine_raster",
         kernel="fineRaster",
         events=FineRasterEvent,
-        table=table,
+        table=rows,
         grid=simt.sms,
         block=32 * warps,
         shared_bytes=shared,
         dispatch="warp_queue",
-        streams=_streams(table, setup, len(tile_entries), width, height, samples),
+        streams=_streams(rows, setup, len(tile_entries), width, height, samples),
         atomic_requests=queue,
         variant="" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa",
     )
 
 
-def _with_starts(rows: NDArray[np.int64], warps: int, segment_bytes: int) -> NDArray[np.int64]:
+def _add_starts(rows: NDArray[np.int64], warps: int, segment_bytes: int) -> None:
     """Add what a warp does besides its tiles to the first that it draws: it starts, and its last draw finds no tile."""
-    E, table = FineRasterEvent, rows.copy()
-    if len(table):
-        starts = np.bincount(np.arange(warps) % len(table), minlength=len(table))
-        for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
-            table[:, event] += starts
-        loads = START_LOADS * starts + table[:, E.ATOMIC]  # and with each draw the number of tiles
-        table[:, E.LOAD_TRANSACTIONS] += loads
-        table[:, E.LOAD_BYTES] += loads * segment_bytes
-    return table
+    if not len(rows):
+        return
+    E, starts = FineRasterEvent, np.bincount(np.arange(warps) % len(rows))
+    for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
+        rows[: len(starts), event] += starts
+    loads = rows[:, E.ATOMIC].copy()  # with each draw the number of tiles
+    loads[: len(starts)] += START_LOADS * starts
+    rows[:, E.LOAD_TRANSACTIONS] += loads
+    rows[:, E.LOAD_BYTES] += loads * segment_bytes
 
 
 def _streams(
@@ -79,19 +79,19 @@ def _streams(
     a cache, and each passes once, or once an SM that asks for it where L1 is what keeps it.
     """
     E = FineRasterEvent
-    total = table.sum(axis=0)
-    lists = int(total[E.SEGMENTS]) * 4 * SEGMENT
-    headers = int(total[E.ENTRY_LANES]) * HEADER_BYTES
+    segments, lanes, loads, loaded, stored = (
+        int(table[:, event].sum()) for event in (E.SEGMENTS, E.ENTRY_LANES, E.TILE_LOADS, E.LOAD_BYTES, E.STORE_BYTES)
+    )
+    lists, headers, tiles = segments * 4 * SEGMENT, lanes * HEADER_BYTES, loads * 2 * 4 * PIXELS * samples
     kept = int(setup.subtriangles.sum(dtype=np.int64))
     pixels = 2 * 4 * PIXELS * samples * (-(-width // TILE) * -(-height // TILE))
-    tiles = int(total[E.TILE_LOADS]) * 2 * 4 * PIXELS * samples
-    rest = max(int(total[E.LOAD_BYTES]) - lists - headers - tiles, 0)
+    rest = max(loaded - lists - headers - tiles, 0)
     return (
         Stream("tile_queues", "load", lists, 4 * entries),
         _gathered("headers", headers, kept * HEADER_BYTES),
         _gathered("triangle_data", rest, kept * setup.planes.shape[1] * 4),
         Stream("pixels", "load", tiles, pixels if tiles else 0),
-        Stream("pixels", "store", int(total[E.STORE_BYTES]), pixels),
+        Stream("pixels", "store", stored, pixels),
     )
 
 

@@ -9,8 +9,10 @@ from tilestamp.models.coalescing import smallest_transaction_bytes
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import PIXELS, TILE, Draw, FineRasterEvent, Tile
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import shade
+from tilestamp.simulator.stages.laine2011.lanes import write_reversed
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX, DEPTH_MIN
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
+from tilestamp.simulator.stages.prefetch import prefetch
 
 
 class FrameBuffers(NamedTuple):
@@ -25,6 +27,11 @@ class FrameBuffers(NamedTuple):
 def load_tile(buffers: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
     """Clear a tile, or take its pixels from earlier draws."""
     tile.owner[:] = -1
+    for sample in range(1 << draw.log_samples):
+        for line in range(y, y + TILE):
+            prefetch(buffers.ids[sample, line], x)
+            prefetch(buffers.depth[sample, line], x)
+            prefetch(buffers.color[sample, line], x)
     if draw.clear:
         tile.depth[:] = draw.clear_depth
         tile.color[:] = draw.clear_color
@@ -45,20 +52,21 @@ def load_layer(behind: Any, tile: Tile, x: int, y: int) -> None:
 
 @kernel(lent=True)
 def store_tile(buffers: Any, setup: Setup, colors: Any, draw: Draw, tile: Tile, x: int, y: int) -> None:
-    """Write what a tile has, shaded where its fragments are shaded late."""
+    """Write what a tile has, shaded where its fragments are shaded late; its records become input triangles."""
     for at in range(PIXELS << draw.log_samples):
-        p = at & (PIXELS - 1)
-        sample, i, j = at // PIXELS, x + 7 - (p & 7), y + (p >> 3)
-        record, color = np.int64(tile.owner[at]), np.int64(tile.color[at])
+        p, record = at % PIXELS, np.int64(tile.owner[at])
+        i, j = x + 7 - (p & 7), y + (p >> 3)
         if record >= 0:
-            buffers.ids[sample, j, i] = setup.inputs[record]
+            tile.owner[at] = setup.inputs[record]
             if draw.shade_late:
-                color = shade(setup.planes, record, colors, i, j, -1, draw)
-        elif draw.clear:
-            buffers.ids[sample, j, i] = -1
-        else:
-            continue
-        buffers.depth[sample, j, i], buffers.color[sample, j, i] = tile.depth[at], color
+                tile.color[at] = shade(setup.planes, record, colors, i, j, -1, draw)
+        elif not draw.clear:
+            tile.owner[at] = buffers.ids[at // PIXELS, j, i]
+    for at in range(0, PIXELS << draw.log_samples, TILE):
+        sample, line = at // PIXELS, y + (at % PIXELS >> 3)
+        write_reversed(tile.owner, at, buffers.ids[sample, line], x)
+        write_reversed(tile.depth, at, buffers.depth[sample, line], x)
+        write_reversed(tile.color, at, buffers.color[sample, line], x)
 
 
 @kernel(lent=True)

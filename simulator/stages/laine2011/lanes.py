@@ -111,6 +111,11 @@ def write(first: Any, step: Any, values: Any, at: Any, bits: Any) -> None:
             values[at + i] = np.int64(first + i * step).astype(values.dtype)
 
 
+def write_reversed(values: Any, at: Any, target: Any, i: Any) -> None:
+    """Write the eight numbers from ``values[at]`` on to ``target[i]`` and behind it, the last one first."""
+    target[i : i + LANES] = values[at : at + LANES][::-1]
+
+
 def _ramp(builder: Any, first: Any, step: Any, row: Any) -> Any:
     from llvmlite import ir
 
@@ -158,3 +163,25 @@ def _below(first, step, values, at, or_equal):  # type: ignore[no-untyped-def]  
 @overload(write)
 def _write(first, step, values, at, bits):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
     return lambda first, step, values, at, bits: _llvm_write(first, step, values, at, bits)  # noqa: PLW0108 - as above
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _llvm_write_reversed(_context: Any, values: Any, at: Any, target: Any, i: Any) -> Any:
+    from llvmlite import ir
+
+    row = ir.VectorType(ir.IntType(32), LANES)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        source, place = (vectors(context, builder, signature.args[k], args[k], args[k + 1], row) for k in (0, 2))
+        held = builder.load(source, align=4)
+        builder.store(
+            builder.shuffle_vector(held, held, ir.Constant(row, list(reversed(range(LANES))))), place, align=4
+        )
+        return context.get_dummy_value()
+
+    return types.void(values, at, target, i), codegen
+
+
+@overload(write_reversed)
+def _write_reversed(values, at, target, i):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares signatures
+    return lambda values, at, target, i: _llvm_write_reversed(values, at, target, i)  # noqa: PLW0108 - as above
