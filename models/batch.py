@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tilestamp.models.atomic_units import dealing_of, fullest_unit_ns
+from tilestamp.models.atomic_units import Dealing, dealing_of, fullest_unit_ns
 from tilestamp.models.bounds import COLUMNS, Fact
 from tilestamp.models.launch import Launch, PipeLaunch
 from tilestamp.models.launch_prices import launch_prices
@@ -85,13 +85,20 @@ class Batch:
         for launch, into in zip(launches, facts, strict=True):
             if isinstance(launch, Launch):
                 asked = launch.block, launch.registers, launch.shared_bytes
-                into[:, Fact.RESIDENT_BLOCKS] = self._holding.each(
-                    [residency(m, *asked).blocks for m in self._holding.machines]
-                )
-                if launch.atomic_requests is not None:
-                    dealt = [fullest_unit_ns(launch.atomic_requests, dealing_of(m)) for m in self._dealing.machines]
+                held = [residency(machine, *asked).blocks for machine in self._holding.machines]
+                into[:, Fact.RESIDENT_BLOCKS] = self._holding.each(held)
+                requests, known = launch.atomic_requests, launch.fullest_ns
+                if requests is not None:
+                    dealt = [_fullest_ns(requests, dealing_of(machine), known) for machine in self._dealing.machines]
                     into[:, Fact.FULLEST_NS] = self._dealing.each(dealt)
         return facts
+
+
+def _fullest_ns(requests: NDArray[np.int64], dealing: Dealing, known: dict[Hashable, float]) -> float:
+    """Time of the fullest atomic unit, if it is not known: finding it takes longer than the rest of a price."""
+    if dealing not in known:
+        known[dealing] = fullest_unit_ns(requests, dealing)
+    return known[dealing]
 
 
 class _Shared:

@@ -84,7 +84,7 @@ class Fact(IntEnum):
     FULLEST_NS = 9  # that the atomic unit with the most to do is busy
 
 
-@kernel
+@kernel(lent=True)
 def moved_of(facts: Any) -> Traffic:
     """Bytes of a launch, from its facts."""
     return Traffic(
@@ -99,7 +99,7 @@ def moved_of(facts: Any) -> Traffic:
     )
 
 
-@kernel
+@kernel(lent=True)
 def places_of(launch: Shape, machine: Any, facts: Any) -> tuple[int, int]:
     """Units that the machine holds together, and SMs that hold any: blocks are dealt to SMs one after another."""
     sms = int(machine[M.SM_COUNT])
@@ -108,9 +108,9 @@ def places_of(launch: Shape, machine: Any, facts: Any) -> tuple[int, int]:
     return blocks * warps, max(1, min(sms, blocks))
 
 
-@kernel
-def bound_terms(launch: Shape, units: Whole, totals: Any, machine: Any, facts: Any) -> Any:
-    """Cycles of each term, (len(Term),).
+@kernel(lent=True)
+def bound_terms(launch: Shape, units: Whole, totals: Any, machine: Any, facts: Any, terms: Any) -> None:
+    """Fill in the cycles of each term.
 
     Parameters
     ----------
@@ -120,8 +120,10 @@ def bound_terms(launch: Shape, units: Whole, totals: Any, machine: Any, facts: A
         Events of all units.
     machine : ndarray, (len(Number),)
     facts : ndarray, (len(Fact),)
+    terms : ndarray, (len(Term),)
+        Filled in.
     """
-    terms = np.zeros(TAIL)
+    terms[:] = 0.0
     places, busy = places_of(launch, machine, facts)
     sms = machine[M.SM_COUNT]
     terms[Term.ISSUE], terms[Term.SHARED], terms[Term.L1] = units.issue / sms, units.shared / sms, units.l1 / sms
@@ -133,10 +135,9 @@ def bound_terms(launch: Shape, units: Whole, totals: Any, machine: Any, facts: A
     if not launch.drawn:
         terms[Term.START] = launch.grid / machine[M.LAUNCH_BLOCKS_PER_US] * machine[M.SM_CLOCK_MHZ]
     terms[Term.LAUNCH] = machine[M.LAUNCH_KERNEL_US] * machine[M.SM_CLOCK_MHZ]
-    return terms
 
 
-@kernel
+@kernel(lent=True)
 def _chip_terms(terms: Any, totals: Any, machine: Any, facts: Any) -> None:
     """What all units together ask of the chip."""
     clock_hz = machine[M.SM_CLOCK_MHZ] * 1e6
@@ -162,7 +163,7 @@ def _chip_terms(terms: Any, totals: Any, machine: Any, facts: Any) -> None:
         terms[Term.ATOMIC] += terms[Term.QUEUE]
 
 
-@kernel
+@kernel(lent=True)
 def longest(terms: Any, way: float) -> float:
     """Cycles of the term that takes longest but for ``launch``; ``way`` is that to the chip's servers and back."""
     roof = 0.0
@@ -172,7 +173,7 @@ def longest(terms: Any, way: float) -> float:
     return roof
 
 
-@kernel
+@kernel(lent=True)
 def bound_launch(terms: Any, way: float, row: Any) -> None:
     """Fill in a row of ``Result`` by the roofline."""
     cycles = terms[Term.LAUNCH] + longest(terms, way)

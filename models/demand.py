@@ -120,7 +120,7 @@ def demand(launch: Launch, machine: Machine, moved: Traffic) -> Demand:
     matrix = np.empty((SUMS, EVENTS))
     rates(launch.shape, numbers_of([machine])[0], Traffic(*map(float, moved)), launch.totals, matrix)
     found: Demand = demand_of(len(launch.events))
-    demands(each_a_kind(launch.columns), matrix, found)
+    demands(each_a_kind(launch.columns), matrix, np.empty((SUMS, TOGETHER)), found)
     return found
 
 
@@ -217,8 +217,8 @@ def atomic_rate(totals: Any, awaited: float, unawaited: float) -> float:
     return unawaited if unawaited and not totals[E.CHAIN_ATOMIC] else awaited
 
 
-@kernel
-def demands(units: Kinds, matrix: Any, found: Demand) -> Whole:
+@kernel(lent=True)
+def demands(units: Kinds, matrix: Any, sums: Any, found: Demand) -> Whole:
     """Fill in what each kind of unit asks for, and sum up over all units.
 
     Parameters
@@ -226,12 +226,13 @@ def demands(units: Kinds, matrix: Any, found: Demand) -> Whole:
     units : Kinds
     matrix : ndarray, (SUMS, EVENTS)
         From ``rates``.
+    sums : ndarray, (SUMS, TOGETHER)
+        Room to work in.
     found : Demand
         Filled in.
     """
     events, others = units.events, matrix[Sum.OTHERS]
     kinds = events.shape[1]
-    sums = np.empty((SUMS, TOGETHER))
     way = np.inf if kinds else 0.0
     for first in range(0, kinds, TOGETHER):
         last = min(kinds, first + TOGETHER)

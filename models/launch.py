@@ -1,6 +1,6 @@
 """A launch: what one kernel, or one pass through the fixed-function pipe, asks of the machine."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -141,6 +141,11 @@ class Launch:
     def kinds(self) -> Kinds:
         """Its units by kind; of a loop, where it matters which unit follows which, each is a kind of its own."""
         return each_a_kind(self.columns) if self.loop else kinds_of(self.columns, np.flatnonzero(self.totals))
+
+    @cached_property
+    def fullest_ns(self) -> dict[Hashable, float]:
+        """What is known already of its fullest atomic unit, by how a machine deals addresses (``models.batch``)."""
+        return {}
 
     @cached_property
     def totals(self) -> NDArray[np.float64]:

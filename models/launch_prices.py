@@ -14,6 +14,7 @@ from tilestamp.models.kinds import Kinds, each_a_kind
 from tilestamp.models.launch import Launch, Shape
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.schedule import Loads, Played, load_units, loads, play, schedule_launch
+from tilestamp.models.sums import TOGETHER
 
 
 def launch_prices(
@@ -61,9 +62,10 @@ def launch_loads(launch: Launch, machine: NDArray[np.float64], facts: NDArray[np
     units, matrix = each_a_kind(launch.columns), np.empty((SUMS, EVENTS))
     found, costs = demand_of(len(launch.events)), np.empty((3, len(launch.events)))
     rates(launch.shape, machine, moved_of(facts), launch.totals, matrix)
-    whole = demands(units, matrix, found)
+    whole = demands(units, matrix, np.empty((SUMS, TOGETHER)), found)
     load_units(found, *costs)
-    terms = bound_terms(launch.shape, whole, launch.totals, machine, facts)
+    terms = np.empty(TAIL)
+    bound_terms(launch.shape, whole, launch.totals, machine, facts, terms)
     amounts = amounts_of(launch.shape, units.events)
     loaded = loads(launch.shape, units.which, tuple(costs), amounts, terms, whole.way, machine, facts)
     return Opened(found, terms, loaded)
@@ -75,20 +77,18 @@ def _price(launch: Shape, units: Kinds, totals: Any, machines: Any, facts: Any, 
     kinds = units.events.shape[1]
     found, amounts = demand_of(kinds), amounts_of(launch, units.events)
     sm, own, alone = np.empty(kinds), np.empty(kinds), np.empty(kinds)
-    matrix, seen, whole = np.empty((SUMS, EVENTS)), np.full((SUMS, EVENTS), np.nan), Whole(0.0, 0.0, 0.0, 0.0, 0.0)
+    sums, matrix, seen = np.empty((SUMS, TOGETHER)), np.empty((SUMS, EVENTS)), np.full((SUMS, EVENTS), np.nan)
+    whole = Whole(0.0, 0.0, 0.0, 0.0, 0.0)
     settled, played = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0), Played(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(len(machines)):
         machine, fact, row = machines[k], facts[k], prices[k]
         rates(launch, machine, moved_of(fact), totals, matrix)
         if not _alike(matrix, seen):
-            whole = demands(units, matrix, found)
+            whole = demands(units, matrix, sums, found)
             load_units(found, sm, own, alone)
             seen[:], settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        terms = bound_terms(launch, whole, totals, machine, fact)
-        for column in range(
-            TAIL
-        ):  # Numba compiles row[:TAIL] = terms for a second: what it would say of unlike lengths
-            row[column] = terms[column]
+        terms = row[:TAIL]
+        bound_terms(launch, whole, totals, machine, fact, terms)
         if scheduled:
             loaded = loads(launch, units.which, (sm, own, alone), amounts, terms, whole.way, machine, fact)
             queue, pace = terms[Term.QUEUE] if launch.drawn else loaded.memory, loaded.pace

@@ -51,6 +51,59 @@ def record_of(units: int) -> Record:
     return Record(np.empty(units), np.empty(units), np.empty(units, np.int64))
 
 
+class Room(NamedTuple):
+    """Where units go.
+
+    Parameters
+    ----------
+    places : int
+    waits, shares : bool
+        Whether units wait for a place, and whether they share SMs: else nobody needs to know who is free first.
+    free, free_games : ndarray
+        ``tournament`` of the times at which places are free.
+    served, served_games : ndarray
+        That of the times at which SMs have served what came before: with no more places than SMs, they always have.
+    """
+
+    places: int
+    waits: bool
+    shares: bool
+    free: Any
+    free_games: Any
+    served: Any
+    served_games: Any
+
+
+class Now(NamedTuple):
+    """Where a schedule stands after a unit.
+
+    Parameters
+    ----------
+    begun, done : float
+        When it got its place, and leaves it.
+    drawn, moved : float
+        When the fullest atomic unit, and memory, have served what came before.
+    soonest, idle : float
+        When the next place is free, and when an SM has served what came before.
+    place, server : int
+        Which place and SM that is.
+    end, last, held : float
+        End of all; the start of the one that ends last; how long all hold their places.
+    """
+
+    begun: float
+    done: float
+    drawn: float
+    moved: float
+    soonest: float
+    idle: float
+    place: Any
+    server: Any
+    end: float
+    last: float
+    held: float
+
+
 @kernel
 def list_schedule(
     which: Any, sm: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace, record: Record
@@ -61,47 +114,85 @@ def list_schedule(
 
     Units start in order, each ``interval`` or more after the one before it: what could not start while all places were
     taken does not start at once later. Those that waited for a place go on more slowly while memory is busy (``Pace``).
-    ``free`` has the times at which places are free, ``served`` those at which SMs have served what came before: where
-    there are no more places than SMs, an SM has always served it by then. ``moved`` is the one at which memory has.
     """
-    units = len(which)
-    waits, shares = units > places, places > sms < units
-    drawing, moving, recording = len(draws) > 0, len(moves) > 0, len(record.start) > 0
-    free, free_who = tournament(places if waits else 1)
-    served, served_who = tournament(sms if shares else 1)
-    drawn = moved = end = last_start = held = soonest = idle = 0.0
-    interval, start, slower = pace
-    begun, busy = -interval, total(moves, which) if moving else 0.0
-    for i in range(units):
-        kind, late = which[i], i >= places
-        begun += interval
-        if late:
-            begun = max(begun, soonest)
-        done = max(idle, begun + start) + sm[kind]
-        if shares:
-            idle = replay(served, served_who, done)
-        begin = begun
-        if drawing:
-            drawn = max(drawn, begun) + draws[kind]
-            begin = drawn
-        if moving:
-            moved = max(moved, begun + start) + moves[kind]
-            done = max(done, moved)
-        own = alone[kind]
-        if late and slower > 1.0:
-            own += min((slower - 1.0) * own, (1.0 - 1.0 / slower) * max(0.0, busy - begin))
-        done = max(done, begin + own)
+    room, now, recording = room_of(places, sms, len(which)), nothing_done(pace), len(record.start) > 0
+    busy = busy_of(moves, which, pace)
+    for i in range(len(which)):
+        kind, place = which[i], now.place if room.waits else i
+        now = step(i, sm[kind], alone[kind], *served_of(draws, moves, kind), pace, busy, room, now)
         if recording:
-            record.start[i], record.end[i], record.place[i] = begun, done, free_who[0] if waits else i
-        held += done - begun
-        if done > end:
-            end, last_start = done, begun
-        if waits:
-            soonest = replay(free, free_who, done)
-    return end, last_start, held
+            record.start[i], record.end[i], record.place[i] = now.begun, now.done, place
+    return now.end, now.last, now.held
 
 
 @kernel
+def list_schedules(
+    which: Any, sm: Any, crowded: Any, alone: Any, draws: Any, moves: Any, places: int, sms: int, pace: Pace
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Two of them: with neighbours, and one unit an SM; side by side, as each by itself waits for what it just did."""
+    many, one = room_of(places, sms, len(which)), room_of(sms, sms, len(which))
+    now, lonely, busy = nothing_done(pace), nothing_done(pace), busy_of(moves, which, pace)
+    for i in range(len(which)):
+        kind = which[i]
+        served = served_of(draws, moves, kind)
+        now = step(i, sm[kind], crowded[kind], *served, pace, busy, many, now)
+        lonely = step(i, sm[kind], alone[kind], *served, pace, busy, one, lonely)
+    return (now.end, now.last, now.held), (lonely.end, lonely.last, lonely.held)
+
+
+@kernel(lent=True, inline=True)
+def step(i: int, sm: float, own: float, draw: float, move: float, pace: Pace, busy: float, room: Room, now: Now) -> Now:
+    """Put unit ``i`` to the place that is free first; ``busy``: when memory has served all."""
+    begun, _, drawn, moved, soonest, idle, place, server, end, last, held = now
+    begun, late = begun + pace.interval, i >= room.places
+    if late:
+        begun = max(begun, soonest)
+    done = max(idle, begun + pace.start) + sm
+    if room.shares:
+        idle, server = replay(room.served, room.served_games, server, done)
+    begin = begun
+    if draw >= 0.0:
+        drawn = max(drawn, begun) + draw
+        begin = drawn
+    moved = max(moved, begun + pace.start) + move
+    if late and pace.slower > 1.0:
+        own += min((pace.slower - 1.0) * own, (1.0 - 1.0 / pace.slower) * max(0.0, busy - begin))
+    done = max(max(done, moved), begin + own)
+    if done > end:
+        end, last = done, begun
+    if room.waits:
+        soonest, place = replay(room.free, room.free_games, place, done)
+    return Now(begun, done, drawn, moved, soonest, idle, place, server, end, last, held + (done - begun))
+
+
+@kernel(lent=True, inline=True)
+def served_of(draws: Any, moves: Any, kind: Any) -> tuple[float, float]:
+    """What the fullest atomic unit (below 0: units are not drawn) and memory serve of a unit."""
+    return draws[kind] if len(draws) > 0 else -1.0, moves[kind] if len(moves) > 0 else 0.0
+
+
+@kernel(lent=True)
+def busy_of(moves: Any, which: Any, pace: Pace) -> float:
+    """When memory has served all units, where that matters."""
+    return total(moves, which) if pace.slower > 1.0 and len(moves) > 0 else 0.0
+
+
+@kernel(lent=True)
+def nothing_done(pace: Pace) -> Now:
+    """Before the first unit."""
+    return Now(-pace.interval, 0.0, 0.0, 0.0, 0.0, 0.0, np.uint32(0), np.uint32(0), 0.0, 0.0, 0.0)
+
+
+@kernel
+def room_of(places: int, sms: int, units: int) -> Room:
+    """All places free, and all SMs idle."""
+    waits, shares = units > places, places > sms < units
+    free, free_games = tournament(places if waits else 1)
+    served, served_games = tournament(sms if shares else 1)
+    return Room(places, waits, shares, free, free_games, served, served_games)
+
+
+@kernel(lent=True)
 def total(costs: Any, which: Any) -> float:
     """Costs of all units, added up in their order."""
     total = 0.0
@@ -112,39 +203,36 @@ def total(costs: Any, which: Any) -> float:
 
 @kernel
 def tournament(players: int) -> Any:
-    """Times of ``players`` that meet in a tournament: the winner's, which is the soonest, and each game's loser's.
+    """Times of ``players``, and the loser of each game of their tournament, in which the sooner one wins; 0 wins it.
 
-    ``times[0]`` and ``who[0]`` are the winner's; game ``g`` is played by the winners of games ``2 g`` and ``2 g + 1``.
-    Times are not below 0, and kept as their bits: as integers these have the same order, and compare sooner.
+    Game ``g`` is played by the winners of games ``2 g`` and ``2 g + 1``. Times are not below 0, and kept as their bits:
+    as integers these have the same order, and compare sooner.
     """
     leaves = 1
     while leaves < players:
         leaves *= 2
-    times = np.zeros(leaves)
-    who = np.zeros(leaves, np.uint32)
+    times, losers = np.zeros(leaves), np.zeros(leaves, np.uint32)
+    times[players:] = np.inf
     for game in range(1, leaves):  # all times are 0: let the left win everywhere, so the right loses
         leaf = 2 * game + 1
         while leaf < leaves:
             leaf *= 2
-        who[game] = leaf - leaves
-        if leaf - leaves >= players:
-            times[game] = np.inf
-    return times.view(np.uint64), who
+        losers[game] = leaf - leaves
+    return times.view(np.uint64), losers
 
 
 @kernel(lent=True, inline=True)
-def replay(times: Any, who: Any, time: float) -> float:
-    """Give the winner a later time, play its games again, and return the time of whoever wins now."""
-    bits, winner = np.float64(time).view(np.uint64), who[0]
-    game = (winner + np.uint32(len(times))) >> np.uint32(1)
+def replay(times: Any, losers: Any, winner: Any, time: float) -> Any:
+    """Give the winner a later time, and play its games again: the time of whoever wins now, and who it is."""
+    bits = np.float64(time).view(np.uint64)
+    times[winner] = bits
+    game = (winner + np.uint32(len(losers))) >> np.uint32(1)
     while game > np.uint32(0):
-        other, loser = times[game], who[game]
+        loser = losers[game]
+        other = times[loser]
         beaten = other < bits
-        times[game] = bits if beaten else other
-        who[game] = winner if beaten else loser
+        losers[game] = winner if beaten else loser
         bits = other if beaten else bits
         winner = loser if beaten else winner
         game >>= np.uint32(1)
-    times[0] = bits
-    who[0] = winner
-    return np.uint64(bits).view(np.float64)
+    return np.uint64(bits).view(np.float64), winner

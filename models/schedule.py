@@ -43,7 +43,7 @@ from tilestamp.models.bounds import TAIL, Result, Term, longest, places_of
 from tilestamp.models.demand import IN_THE_WAY, Demand
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Shape
-from tilestamp.models.list_schedule import Pace, Record, list_schedule, record_of, total
+from tilestamp.models.list_schedule import Pace, Record, list_schedule, list_schedules, record_of, total
 from tilestamp.models.numbers import Number as M
 from tilestamp.models.partition import partitioned
 from tilestamp.models.turns import at_least, in_turn, rest_of
@@ -126,7 +126,7 @@ class Played(NamedTuple):
     held: float
 
 
-@kernel
+@kernel(lent=True)
 def load_units(units: Demand, sm: Any, own: Any, alone: Any) -> None:
     """Fill in ``Loads.sm``, ``Loads.own`` and ``Loads.alone``."""
     for i in range(len(sm)):
@@ -186,16 +186,19 @@ def play(units: Loads) -> Played:
     own, work = total(units.alone, units.which), total(units.sm, units.which)
     mean, served = own / max(1, count), work / units.sms
     crowded, more = crowd(units)
-    end, started, held = ends(units, crowded, units.places, record_of(0))
-    waited = end * more / (own + more) if more else 0.0
-    if more and not units.loop and own / units.sms < end + waited:
-        lonely, lonely_started, lonely_held = ends(units, units.alone, units.sms, record_of(0))
-        if lonely < end:
-            started, held = lonely_started, lonely_held
-        return Played(
-            min(lonely, end - waited), min(lonely, end), min(lonely, end + waited), started, mean, served, held
-        )
-    return Played(end - waited, end, end + waited, started, mean, served, held)
+    if not more or units.loop:
+        end, started, held = ends(units, crowded, units.places, record_of(0))
+        waited = end * more / (own + more) if more else 0.0
+        return Played(end - waited, end, end + waited, started, mean, served, held)
+    costs = units.which, units.sm, crowded, units.alone, units.draws, units.moves
+    (end, started, held), lonely = list_schedules(*costs, units.places, units.sms, units.pace)
+    waited = end * more / (own + more)
+    low, high = end - waited, end + waited
+    if own / units.sms < high:
+        if lonely[0] < end:
+            end, started, held = lonely
+        low, high = min(lonely[0], low), min(lonely[0], high)
+    return Played(low, end, high, started, mean, served, held)
 
 
 @kernel
@@ -211,11 +214,12 @@ def crowd(units: Loads) -> tuple[Any, float]:
     count = len(units.which)
     if min(count, units.places) <= units.sms:
         return units.alone, 0.0
-    rest = rest_of(units.sm, units.places, units.sms) if units.loop else np.empty(0)
-    beside = min(count, units.places) / units.sms - 1.0
-    work, own = total(units.sm, units.which), total(units.alone, units.which)
-    others = beside * work / own
-    waits, near = np.empty(len(units.sm)), 0.0 if units.loop else _neighbours(units, work)
+    rest, others, work = np.empty(0), 0.0, total(units.sm, units.which)
+    if units.loop:
+        rest = rest_of(units.sm, units.places, units.sms)
+        others = (min(count, units.places) / units.sms - 1.0) * work / total(units.alone, units.which)
+    near = 0.0 if units.loop else _neighbours(units, work)
+    waits = np.empty(len(units.sm))
     for i in range(len(waits)):
         wait = in_turn(units.own[i], units.alone[i], rest[i], others) if units.loop else min(units.own[i], near)
         waits[i] = wait * IN_THE_WAY
@@ -231,7 +235,7 @@ def _neighbours(units: Loads, work: float) -> float:
     return partitioned(units.sm[units.which], count - sms)[: count - sms].sum() / sms  # type: ignore[no-any-return]
 
 
-@kernel
+@kernel(lent=True)
 def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, row: Any) -> None:
     """Fill in a row of ``Result`` by the schedule; ``some_idle``: whether an SM gets nothing."""
     least, before = longest(terms, units.way), terms[Term.LAUNCH]
@@ -249,7 +253,7 @@ def schedule_launch(units: Loads, played: Played, terms: Any, some_idle: bool, r
     row[Result.BOUND] = holds(terms, cycles, row[Result.TAIL_CYCLES], some_idle)
 
 
-@kernel
+@kernel(lent=True)
 def together(units: Loads, played: Played, end: float, share: float) -> float:
     """Cycles of the SMs, memory and atomic units side by side, for a share of the smaller in each other's way."""
     if end == 0.0:
@@ -262,7 +266,7 @@ def together(units: Loads, played: Played, end: float, share: float) -> float:
     return longest_side
 
 
-@kernel
+@kernel(lent=True)
 def holds(terms: Any, played: float, tail: float, some_idle: bool) -> int:
     """Name what holds: a term, or the lack of balance that the terms do not see."""
     largest, inner = int(np.argmax(terms)), int(np.argmax(terms[: Term.LAUNCH]))

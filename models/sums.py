@@ -7,7 +7,7 @@ from tilestamp.models.kernel import kernel
 TOGETHER = 500  # units whose counts stay in the cache of this computer; no power of 2, whose rows would collide there
 
 
-@kernel
+@kernel(lent=True)
 def sum_up(matrix: Any, counts: Any, first: int, last: int, sums: Any, place: int) -> None:
     """Fill in ``matrix @ counts`` of some units; nothing is added for what is 0 in the matrix.
 
