@@ -229,13 +229,13 @@ def _make_work(
     unroll = UNROLLED if simt.coalescing == Coalescing.WARP_SECTORS else 1
     second = -(-4 * pixels // 256) * 256
     shape = FrameShape(width, 8, 1, 0, unroll) if packing == "64" else FrameShape(width, 4, 2, second, unroll)
-    size = shape.words * max(shape.plane_bytes, shape.word_bytes * pixels)
+    plane = max(shape.plane_bytes, shape.word_bytes * pixels)
     workers = 1 if early else WORKERS
     table = np.zeros((blocks, len(FreePipeEvent)), np.int64)
-    chunks = np.zeros((workers, -(-size // CHUNK_BYTES)), np.int64)
+    chunks = np.zeros((workers, -(-plane // CHUNK_BYTES)), np.int32)
     words = np.full(pixels, EMPTY, np.uint64) if early else None
     for_parts(draw_blocks, workers, triangles, pieces, block, shape, simt, table, chunks, words)
-    requests = chunks.sum(axis=0)
+    requests = np.tile(chunks.sum(axis=0, dtype=np.int64), shape.words)
     E = FreePipeEvent
     served = CHUNK_BYTES * int(table[:, E.ATOMIC_REQUESTS].sum())
     streams = (

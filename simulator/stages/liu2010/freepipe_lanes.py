@@ -1,4 +1,4 @@
-"""FreePipe, what the lanes of a warp keep between steps, and the frame buffer as they address it."""
+"""FreePipe, what the lanes of a warp keep between rows and steps, and the frame buffer as they address it."""
 
 from typing import Any, NamedTuple
 
@@ -22,22 +22,22 @@ class FrameShape(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """One warp: scratch space of a worker."""
+    """One warp: scratch space of a worker. A number of each lane lies side by side, to work on several at once."""
 
     piece: NDArray[np.int64]  # (32,) the triangle that each lane scans, -1: none
-    row: NDArray[np.int64]  # (32, 9) edge functions at the row's first pixel, and their steps
-    pixel: NDArray[np.int64]  # (32, 3) edge functions at the pixel
-    row_depth: NDArray[np.float32]  # (32,)
-    depth: NDArray[np.float32]  # (32,)
+    corner: NDArray[np.int32]  # (6 * 32,) x0 y0 x1 y1 x2 y2 of it
+    box: NDArray[np.int32]  # (6 * 32,) first column and row; rows, columns, columns beyond whole turns, whole turns
+    edge: NDArray[np.float64]  # (9 * 32,) edge functions at the row's first pixel, their steps up, and to the left
+    span: NDArray[np.int32]  # (2 * 32,) first column of the row that is covered, and the first beyond it that is not
+    step: NDArray[np.uint32]  # (2 * 32,) first step of a loop that hits, and how many do
+    first: NDArray[np.int64]  # (32,) pixel at which the row begins
+    here: NDArray[np.int64]  # (32,) pixel of the loop's step 0
+    depth: NDArray[np.float32]  # (2, 32) depth at the row's first pixel, and at the column reached
+    column: NDArray[np.int64]  # (32,) that column
     address: NDArray[np.int64]  # (32,) of the lanes that hit, side by side
     value: NDArray[np.uint64]  # (32,)
-    row_lane: NDArray[np.int64]  # (32,) the lanes that have the row in hand, side by side ...
-    row_pixel: NDArray[np.int64]  # (32,) ... the first pixel of each one's box in it ...
-    row_columns: NDArray[np.int64]  # (32,) ... how many there are ...
-    row_rest: NDArray[np.int64]  # (32,) ... and how many beyond whole turns
-    seen: NDArray[np.int64]  # (2, 64) hash tables of the addresses and of the chunks of an instruction, -1: free
-    most: NDArray[np.int64]  # (2, 64) lanes at the address so far; the most at any address of the chunk
-    slot: NDArray[np.int64]  # (32, 2) where each hit stands in the two tables, to free them
+    seen: NDArray[np.int64]  # (64 + 1,) hash table of an instruction's chunks: its number and theirs; then the number
+    ranks: NDArray[np.uint64]  # (64,) lanes at each word of the chunk so far, a byte each
 
 
 @kernel
@@ -45,17 +45,17 @@ def new_lanes() -> Any:
     """Scratch space of one worker."""
     return Lanes(
         np.empty(WARP, np.int64),
-        np.empty((WARP, 9), np.int64),
-        np.empty((WARP, 3), np.int64),
-        np.empty(WARP, np.float32),
-        np.empty(WARP, np.float32),
+        np.zeros(6 * WARP, np.int32),
+        np.zeros(6 * WARP, np.int32),
+        np.zeros(9 * WARP, np.float64),
+        np.empty(2 * WARP, np.int32),
+        np.empty(2 * WARP, np.uint32),
+        np.zeros(WARP, np.int64),
+        np.empty(WARP, np.int64),
+        np.empty((2, WARP), np.float32),
+        np.empty(WARP, np.int64),
         np.empty(WARP, np.int64),
         np.empty(WARP, np.uint64),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.int64),
-        np.empty(WARP, np.int64),
-        np.full((2, SLOTS), -1, np.int64),
-        np.empty((2, SLOTS), np.int64),
-        np.empty((WARP, 2), np.int64),
+        np.zeros(SLOTS + 1, np.int64),
+        np.empty(SLOTS, np.uint64),
     )

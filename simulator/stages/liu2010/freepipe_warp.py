@@ -9,19 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from tilestamp.models.atomics import CHUNK_BYTES, SECTOR
+from tilestamp.models.atomics import SECTOR
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.coalescing import transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.liu2010.freepipe_events import FreePipeEvent
 from tilestamp.simulator.stages.liu2010.freepipe_lanes import SLOTS, WARP, FrameShape, Lanes, new_lanes
+from tilestamp.simulator.stages.liu2010.freepipe_rows import (
+    cover_row,
+    find_steps,
+    hit_lanes,
+    longest,
+    start_lanes,
+    take_boxes,
+)
 from tilestamp.simulator.stages.liu2010.freepipe_triangle import (
     CLIPPED,
     INSIDE,
-    SUBPIXEL_BITS,
     Pieces,
     fixed_depth,
-    start_edges,
 )
 
 INDEX_BYTES = 4
@@ -30,154 +37,152 @@ WIDE = 8  # bytes of a fragment in one word
 
 
 @kernel(lent=True)
-def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, address: Any, row: Any) -> None:
-    """Count loads of three indices and three positions a lane."""
+def _count_vertices(
+    triangles: Any, t0: int, lanes: int, simt: Simt, indices: tuple[int, int], address: Any, row: Any
+) -> None:
+    """Count loads of three indices, known for a full warp, and of three positions a lane."""
+    count, size = indices if lanes == WARP else _index_loads(lanes, simt, address)
+    mine = triangles[t0 : t0 + lanes]
     for k in range(3):
         for lane in range(lanes):
-            address[lane] = (t0 + lane) * 3 * INDEX_BYTES + INDEX_BYTES * k
-        count, size = transactions(address, lanes, INDEX_BYTES, simt.coalescing)
-        for lane in range(lanes):
-            address[lane] = np.int64(triangles[t0 + lane, k]) * POSITION_BYTES
+            address[lane] = np.int64(mine[lane, k]) * POSITION_BYTES
         more, more_size = transactions(address, lanes, POSITION_BYTES, simt.coalescing)
-        row[FreePipeEvent.LOAD_TRANSACTIONS] += count + more
-        row[FreePipeEvent.LOAD_BYTES] += size + more_size
+        count, size = count + more, size + more_size
+    row[FreePipeEvent.LOAD_TRANSACTIONS] += count
+    row[FreePipeEvent.LOAD_BYTES] += size
 
 
 @kernel(lent=True)
-def _start_rows(pieces: Pieces, lanes: Lanes) -> tuple[int, int, int]:
-    """Set each lane up at its box's first pixel; returns lanes with a piece, those with a pixel, and the most rows."""
-    active, boxes, most = 0, 0, 0
+def _index_loads(lanes: int, simt: Simt, address: Any) -> tuple[int, int]:
+    """Transactions and bytes of the loads of three indices a lane; all warps begin at a multiple of 128 bytes."""
+    count, size = 0, 0
+    for k in range(3):
+        for lane in range(lanes):
+            address[lane] = (3 * lane + k) * INDEX_BYTES
+        more, more_size = transactions(address, lanes, INDEX_BYTES, simt.coalescing)
+        count, size = count + more, size + more_size
+    return count, size
+
+
+@kernel(lent=True)
+def _start_depths(pieces: Pieces, lanes: Lanes, r: int) -> None:
+    """Depths of row r at the lanes' first pixels; then step up to the next row."""
     for lane in range(WARP):
-        p = lanes.piece[lane]
-        if p >= 0:
-            active += 1
-            box = pieces.box[p]
-            start_edges(pieces.corner[p], SUBPIXEL_BITS, box[0], box[2], lanes.row[lane])
-            lanes.row_depth[lane] = pieces.depth[p, 0]
-            if box[1] >= box[0] and box[3] >= box[2]:
-                boxes += 1
-                most = max(most, int(box[3] - box[2] + 1))
-    return active, boxes, most
+        if r < lanes.box[2 * WARP + lane]:
+            p = lanes.piece[lane]
+            depth = pieces.depth[p, 0] if r == 0 else lanes.depth[0, lane]
+            lanes.depth[1, lane], lanes.column[lane] = depth, 0
+            lanes.depth[0, lane] = depth + pieces.depth[p, 2] * np.float32(16)
 
 
 @kernel(lent=True)
-def _start_row(pieces: Pieces, lanes: Lanes, r: int, width: int, unroll: int) -> tuple[int, int, int]:
-    """Let the lanes that have row r begin it; returns how many those are, and their longest way through its pixels.
-
-    That is the most pixels of any beyond a multiple of ``unroll``, and the most turns of ``unroll`` pixels of any.
-    """
-    active, rest, turns = 0, 0, 0
-    for lane in range(WARP):
-        p = lanes.piece[lane]
-        if p >= 0 and pieces.box[p, 2] + r <= pieces.box[p, 3] and pieces.box[p, 1] >= pieces.box[p, 0]:
-            lanes.row_lane[active] = lane
-            lanes.row_pixel[active] = (np.int64(pieces.box[p, 2]) + r) * width + pieces.box[p, 0]
-            columns = np.uint32(pieces.box[p, 1] - pieces.box[p, 0] + 1)  # divided faster than a signed number
-            lanes.row_columns[active], lanes.row_rest[active] = columns, columns % np.uint32(unroll)
-            rest = max(rest, int(lanes.row_rest[active]))
-            turns = max(turns, int(np.int64(columns // np.uint32(unroll))))
-            active += 1
-            for k in range(3):
-                lanes.pixel[lane, k] = lanes.row[lane, k]
-                lanes.row[lane, k] += lanes.row[lane, 3 + 2 * k]
-            lanes.depth[lane] = lanes.row_depth[lane]
-            lanes.row_depth[lane] += pieces.depth[p, 2] * np.float32(16)
-    return active, rest, turns
+def _depth_at(pieces: Pieces, lanes: Lanes, lane: int, column: int) -> Any:
+    """Depth of a lane at a column, reached step by step as a thread does."""
+    while lanes.column[lane] < column:
+        lanes.depth[1, lane] += pieces.depth[lanes.piece[lane], 1] * np.float32(16)
+        lanes.column[lane] += 1
+    return lanes.depth[1, lane]
 
 
 @kernel(lent=True)
-def _step(
-    pieces: Pieces, lanes: Lanes, active: int, c: int, rest: int, word_bytes: int, ids: Any
-) -> tuple[int, int, int]:
-    """Test a pixel of the row of every lane that has one in step c; returns lanes in the row, tests and hits.
-
-    A lane first tests what its row has beyond whole turns of the loop, in the first ``rest`` steps of the warp. After
-    those, lanes that have no such pixel leave the row, and the others close up.
-    """
-    tests, hits, stay = 0, 0, 0
-    for i in range(active):
-        lane, first, columns, beyond = lanes.row_lane[i], lanes.row_pixel[i], lanes.row_columns[i], lanes.row_rest[i]
-        mine = beyond if c < rest else columns - beyond + rest
-        if c >= mine and c >= rest:
-            continue
-        if stay < i:
-            lanes.row_lane[stay], lanes.row_pixel[stay] = lane, first
-            lanes.row_columns[stay], lanes.row_rest[stay] = columns, beyond
-        stay += 1
-        if c >= mine:
-            continue
-        lanes.row_pixel[stay - 1] += 1
-        tests += 1
-        f = lanes.pixel[lane]
-        if f[0] | f[1] | f[2] >= 0:
-            lanes.address[hits] = first * word_bytes
-            if ids:
-                lanes.value[hits] = np.uint64(fixed_depth(lanes.depth[lane]) << 32) | np.uint64(lane + 1)
-            hits += 1
-        for k in range(3):
-            f[k] -= lanes.row[lane, 4 + 2 * k]
-        lanes.depth[lane] += pieces.depth[lanes.piece[lane], 1] * np.float32(16)
-    return stay, tests, hits
-
-
-@kernel(lent=True)
-def _early(lanes: Lanes, hits: int, t0: int, frame: Any, word_bytes: int, simt: Simt, row: Any) -> int:
+def _early(pieces: Pieces, lanes: Lanes, bits: Any, c: int, t0: int, frame: Any, simt: Simt, row: Any) -> Any:
     """Read the pixels first and keep the lanes that are nearer; all read before any writes."""
-    count, size = transactions(lanes.address, hits, word_bytes, simt.coalescing)
+    hits, kept, left = 0, np.uint64(0), bits
+    while left != np.uint64(0):
+        lane = lowest_bit(left)
+        left &= left - np.uint64(1)
+        pixel = lanes.here[lane] + c
+        lanes.address[hits] = pixel * WIDE
+        hits += 1
+        depth = fixed_depth(_depth_at(pieces, lanes, lane, pixel - lanes.first[lane]))
+        lanes.value[lane] = np.uint64(depth << 32) | np.uint64(t0 + lane + 1)
+        if frame[pixel] > lanes.value[lane]:
+            kept |= np.uint64(1) << np.uint64(lane)
+    count, size = transactions(lanes.address, hits, WIDE, simt.coalescing)
     row[FreePipeEvent.READS] += 1
     row[FreePipeEvent.LOAD_TRANSACTIONS] += count
     row[FreePipeEvent.LOAD_BYTES] += size
-    kept = 0
-    for i in range(hits):
-        value = lanes.value[i] + np.uint64(t0)
-        if frame[lanes.address[i] // word_bytes] > value:
-            lanes.address[kept], lanes.value[kept] = lanes.address[i], value
-            kept += 1
-    for i in range(kept):
-        pixel = lanes.address[i] // word_bytes
-        frame[pixel] = min(frame[pixel], lanes.value[i])
+    left = kept
+    while left != np.uint64(0):
+        lane = lowest_bit(left)
+        left &= left - np.uint64(1)
+        pixel = lanes.here[lane] + c
+        frame[pixel] = min(frame[pixel], lanes.value[lane])
     return kept
 
 
 @kernel(lent=True)
-def _slot(seen: Any, most: Any, key: int) -> int:
-    """Place of a key in a hash table; a new one begins with 0."""
-    i = key & (SLOTS - 1)
-    while seen[i] != key:
-        if seen[i] < 0:
-            seen[i], most[i] = key, 0
-        else:
-            i = (i + 1) & (SLOTS - 1)
-    return i
+def _most_lanes(ranks: Any) -> int:
+    """Lanes at the most wanted word of a chunk so far."""
+    most = 0
+    for byte in range(0, 64, 8):
+        most = max(most, int((ranks >> np.uint64(byte)) & np.uint64(255)))
+    return most
 
 
 @kernel(lent=True)
-def _count_atomics(lanes: Lanes, hits: int, shape: FrameShape, merge: int, row: Any, chunks: Any) -> None:
-    """One instruction on each plane of the frame buffer, by the rules of ``tilestamp.models.atomics``.
+def _send(lanes: Lanes, bits: Any, c: int, chunk_bits: int, merge: int, chunks: Any) -> tuple[int, int, int]:
+    """Count requests, conflicts and depth of one atomic instruction, by the rules of ``tilestamp.models.atomics``.
 
     A lane's rank is its place among those at its address; merged by sector, a request carries the lanes of one rank.
     """
-    conflicts, depth, requests = 0, 0, 0
-    shift = 3 if shape.word_bytes == WIDE else 2
-    for i in range(hits):
-        pixel = _slot(lanes.seen[0], lanes.most[0], lanes.address[i] >> shift)
-        chunk = _slot(lanes.seen[1], lanes.most[1], lanes.address[i] // CHUNK_BYTES)
-        rank, served = lanes.most[0, pixel] + 1, lanes.most[1, chunk]
-        lanes.most[0, pixel], lanes.most[1, chunk] = rank, max(rank, served)
-        lanes.slot[i, 0], lanes.slot[i, 1] = pixel, chunk
-        conflicts += rank > 1
-        depth = max(depth, rank)
-        if merge != SECTOR or rank > served:
+    conflicts, depth, requests = 0, 1, 0
+    seen, ranks, here = lanes.seen, lanes.ranks, lanes.here
+    seen[SLOTS] += 1
+    number = seen[SLOTS] << 32
+    while bits != np.uint64(0):
+        pixel = here[lowest_bit(bits)] + c
+        bits &= bits - np.uint64(1)
+        chunk = pixel >> chunk_bits
+        word = np.uint64(1) << np.uint64(8 * (pixel - (chunk << chunk_bits)))
+        key = number | chunk
+        slot = np.uint64(chunk & (SLOTS - 1))
+        while seen[slot] != key and seen[slot] >= number:
+            slot = (slot + np.uint64(1)) & np.uint64(SLOTS - 1)
+        sent = merge != SECTOR
+        if seen[slot] != key:
+            seen[slot], ranks[slot] = key, word
+            sent = True
+        else:
+            before = ranks[slot]
+            ranks[slot] = before + word
+            rank = int(before // word & np.uint64(255)) + 1
+            if rank > 1:
+                conflicts += 1
+                depth = max(depth, rank)
+                sent |= rank > _most_lanes(before)
+        if sent:
             requests += 1
-            for plane in range(shape.words):
-                chunks[(lanes.address[i] + plane * shape.plane_bytes) // CHUNK_BYTES] += 1
-    for i in range(hits):
-        lanes.seen[0, lanes.slot[i, 0]] = lanes.seen[1, lanes.slot[i, 1]] = -1
-    row[FreePipeEvent.ATOMIC] += shape.words
-    row[FreePipeEvent.ATOMIC_LANES] += shape.words * hits
+            chunks[np.uint64(chunk)] += 1
+    return requests, conflicts, depth
+
+
+@kernel(lent=True)
+def _loop(
+    pieces: Pieces, lanes: Lanes, steps: int, t0: int, shape: FrameShape, simt: Simt, row: Any, chunks: Any, frame: Any
+) -> int:
+    """Play the steps of a loop over a row's pixels; returns those that hit."""
+    hit_steps, hits, sends, lanes_sent, requests, conflicts, depth = 0, 0, 0, 0, 0, 0, 0
+    for c in range(steps):
+        bits = hit_lanes(lanes.step, c)
+        if bits == np.uint64(0):
+            continue
+        hit_steps += 1
+        hits += popcount(bits)
+        if frame is not None:
+            bits = _early(pieces, lanes, bits, c, t0, frame, simt, row)
+            if bits == np.uint64(0):
+                continue
+        sent = _send(lanes, bits, c, 2 if shape.word_bytes == WIDE else 3, simt.atomic_merge, chunks)
+        sends, lanes_sent = sends + 1, lanes_sent + popcount(bits)
+        requests, conflicts, depth = requests + sent[0], conflicts + sent[1], depth + sent[2]
+    row[FreePipeEvent.SAMPLE_HITS] += hits
+    row[FreePipeEvent.ATOMIC] += shape.words * sends
+    row[FreePipeEvent.ATOMIC_LANES] += shape.words * lanes_sent
     row[FreePipeEvent.ATOMIC_REQUESTS] += shape.words * requests
     row[FreePipeEvent.ATOMIC_CONFLICTS] += shape.words * conflicts
     row[FreePipeEvent.ATOMIC_DEPTH] += shape.words * depth
+    return hit_steps
 
 
 @kernel(lent=True)
@@ -185,29 +190,26 @@ def _scan(
     pieces: Pieces, lanes: Lanes, t0: int, shape: FrameShape, simt: Simt, row: Any, chunks: Any, frame: Any
 ) -> tuple[int, int, int]:
     """Scan the lanes' pieces in lockstep; returns the steps, the rows, and the steps that hit."""
-    active, boxes, rows = _start_rows(pieces, lanes)
-    steps, hit_steps = 0, 0
-    row[FreePipeEvent.SETUP_STEPS] += 1
-    row[FreePipeEvent.BOX_STEPS] += rows > 0
-    row[FreePipeEvent.BOX_LANES] += boxes
-    row[FreePipeEvent.SETUP_LANES] += active
+    rows = take_boxes(pieces, lanes, shape, row)
+    start_lanes(lanes, shape.width)
+    steps, hit_steps, rest_steps = 0, 0, 0
     for r in range(rows):
-        active, rest, turns = _start_row(pieces, lanes, r, shape.width, shape.unroll)
-        here = rest + turns * shape.unroll
-        row[FreePipeEvent.ROW_STEPS] += 1
-        row[FreePipeEvent.ROW_LANES] += active
-        row[FreePipeEvent.WARP_STEPS] += here
-        row[FreePipeEvent.REST_STEPS] += rest
-        steps += here
-        for c in range(here):
-            active, tests, hits = _step(pieces, lanes, active, c, rest, shape.word_bytes, frame is not None)
-            row[FreePipeEvent.SAMPLE_TESTS] += tests
-            hit_steps += hits > 0
-            row[FreePipeEvent.SAMPLE_HITS] += hits
-            if frame is not None and hits > 0:
-                hits = _early(lanes, hits, t0, frame, shape.word_bytes, simt, row)
-            if hits > 0:
-                _count_atomics(lanes, hits, shape, simt.atomic_merge, row, chunks)
+        rest, turns = longest(lanes.box, r)
+        rest_steps += rest
+        steps += rest + turns * shape.unroll
+        cover_row(lanes.edge, lanes.box, lanes.span, r)
+        if frame is not None:
+            _start_depths(pieces, lanes, r)
+        if rest > 0:
+            find_steps(lanes, False)
+            hit_steps += _loop(pieces, lanes, rest, t0, shape, simt, row, chunks, frame)
+        if turns > 0:
+            find_steps(lanes, True)
+            hit_steps += _loop(pieces, lanes, turns * shape.unroll, t0, shape, simt, row, chunks, frame)
+        for lane in range(WARP):
+            lanes.first[lane] += shape.width
+    row[FreePipeEvent.WARP_STEPS] += steps
+    row[FreePipeEvent.REST_STEPS] += rest_steps
     return steps, rows, hit_steps
 
 
@@ -220,6 +222,7 @@ def _warp(
     shape: FrameShape,
     simt: Simt,
     lanes: Lanes,
+    indices: tuple[int, int],
     row: Any,
     chunks: Any,
     frame: Any,
@@ -227,7 +230,7 @@ def _warp(
     """One warp, triangles t0..t0+lanes_in-1; returns its steps, its rows, and its steps that hit."""
     row[FreePipeEvent.WARPS] += 1
     row[FreePipeEvent.LANES_IN] += lanes_in
-    _count_vertices(triangles, t0, lanes_in, simt, lanes.address, row)
+    _count_vertices(triangles, t0, lanes_in, simt, indices, lanes.address, row)
     inside, clip, turns = 0, 0, 0
     lanes.piece[:] = -1
     for lane in range(lanes_in):
@@ -269,12 +272,13 @@ def draw_blocks(
 ) -> None:
     """Every ``parts``-th block from ``part`` on, with its own rows of ``table`` and its part's of ``chunks``."""
     lanes = new_lanes()
+    indices = _index_loads(WARP, simt, lanes.address)
     for b in range(part, table.shape[0], parts):
         longest = 0
         for t0 in range(b * block, min((b + 1) * block, triangles.shape[0]), WARP):
             lanes_in = min(WARP, min((b + 1) * block, triangles.shape[0]) - t0)
             steps, rows, hit_steps = _warp(
-                triangles, pieces, t0, lanes_in, shape, simt, lanes, table[b], chunks[part], frame
+                triangles, pieces, t0, lanes_in, shape, simt, lanes, indices, table[b], chunks[part], frame
             )
             if steps > longest:
                 longest = steps
