@@ -10,7 +10,7 @@ from tests.diced_scenes import diced
 from tests.naive_tiles import naive_buckets, naive_conflicts
 from tilestamp.models.atomics import count_atomics
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
-from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch, send_requests
+from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import atomic_rule, count_wanted, most_wanted
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import BucketCountEvent as Event
 from tilestamp.simulator.stages.eisenacher2010.bucket_count import bucket_count
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import BucketScanEvent, bucket_scan
@@ -60,16 +60,18 @@ def test_conflicts_are_those_counted_lane_by_lane(simt, padding, aggregate):
 
 
 @pytest.mark.parametrize("merge", list(AtomicMerge))
-def test_short_lists_count_as_the_rules_of_the_machine(merge):
+def test_a_warp_is_counted_by_the_rules_of_the_machine(merge):
     random = np.random.default_rng(3)
-    wanted, chunks = scratch(32), np.zeros(8, np.int64)
+    rule = atomic_rule(H200._replace(atomic_merge=merge), 1)
+    words, chunks, sent = np.empty(32, np.int64), np.zeros(8, np.int64), 0
     for _ in range(200):
         tile = random.integers(-3, 40, 32)
-        counters, sectors, depth, _, _ = list_wanted(tile, 32, 32, 1, wanted)
-        requests = send_requests(wanted, sectors, merge, chunks)
-        active = int((tile >= 0).sum())
+        counters, _, depth, _, _, requests = count_wanted(tile, 32, rule, words, chunks)
+        active, sent = int((tile >= 0).sum()), sent + requests
         addresses = np.where(tile >= 0, 4 * tile, -1)
         assert (active, requests, active - counters, depth) == count_atomics(addresses, 32, merge)
+        assert most_wanted(tile, 32) == depth
+    assert chunks.sum() == sent
 
 
 def test_three_slots_a_side_when_a_bound_is_larger_than_a_tile():

@@ -1,15 +1,15 @@
 """Conflicts of one atomic instruction in a warp: lanes that want the same counter, or the same 32-byte lock.
 
-The numbers are those of ``models.atomics`` (and tested against it); short lists of the distinct counters and chunks
-make them cheap, because neighbours in the patch queue want the same few tiles.
+The numbers are those of ``models.atomics`` (and tested against it); they are found a counter at a time, for all lanes
+that want it at once: cheap, because neighbours in the patch queue want the same few tiles.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tilestamp.models.atomics import CHUNK_BYTES
+from tilestamp.models.bits import active_lanes, lanes_near, lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 
@@ -28,36 +28,10 @@ class AtomicRule(NamedTuple):
     padding: int  # words from one counter to the next
 
 
-class Wanted(NamedTuple):
-    """Scratch: the distinct counters that the lanes of one instruction want, and the distinct 32-byte chunks."""
-
-    tile: NDArray[np.int64]
-    tile_lanes: NDArray[np.int64]
-    tile_chunk: NDArray[np.int64]  # index into the next three
-    chunk: NDArray[np.int64]
-    chunk_lanes: NDArray[np.int64]
-    chunk_depth: NDArray[np.int64]  # lanes at the most wanted counter of the chunk
-    together: NDArray[np.int64]  # (2, lanes) lanes of one group at a counter, and at a chunk
-
-
 def atomic_rule(simt: Simt, padding: int) -> AtomicRule:
     """Rule of a machine for counters that lie ``padding`` words apart."""
     half = simt.coalescing == Coalescing.HALF_WARP_SEGMENTS
     return AtomicRule(simt.warp, min(HALF_WARP, simt.warp) if half else simt.warp, int(simt.atomic_merge), padding)
-
-
-@kernel
-def scratch(lanes: int) -> Any:
-    """Make the lists for one warp."""
-    return Wanted(
-        np.empty(lanes, np.int64),
-        np.empty(lanes, np.int64),
-        np.empty(lanes, np.int64),
-        np.empty(lanes, np.int64),
-        np.empty(lanes, np.int64),
-        np.empty(lanes, np.int64),
-        np.empty((2, lanes), np.int64),
-    )
 
 
 @kernel(lent=True)
@@ -72,66 +46,61 @@ def keep_leaders(tile: Any, lanes: int, leaders: Any) -> None:
 
 
 @kernel(lent=True)
-def _find(values: Any, found: int, value: int, guess: int) -> int:
-    """Index of ``value``, or ``found``; a good guess saves the search."""
-    if guess < found and values[guess] == value:
-        return guess
-    k = 0
-    while k < found and values[k] != value:
-        k += 1
-    return k
+def count_wanted(
+    tile: Any, lanes: int, rule: AtomicRule, word: Any, requests: Any
+) -> tuple[int, int, int, int, int, int]:
+    """Count what the lanes of a warp want, chunk by chunk and in each counter by counter.
 
-
-@kernel(lent=True)
-def list_wanted(tile: Any, lanes: int, group: int, padding: int, wanted: Wanted) -> tuple[int, int, int, int, int]:
-    """List what the lanes of a warp want, of which ``group`` arrive together.
+    Parameters
+    ----------
+    tile : ndarray, (>= lanes,), int64
+        Tile of each lane, negative where it is inactive.
+    lanes : int
+        At most 64.
+    rule : AtomicRule
+    word : ndarray, (>= lanes,), int64
+        Scratch: where the counters lie.
+    requests : ndarray, (chunks,), int64
+        Requests that leave the SM, every lane or what a merged chunk needs; added to.
 
     Returns
     -------
-    tiles, chunks, depth, group_depth, lock_depth : int
+    tiles, chunks, depth, group_depth, lock_depth, sent : int
         Distinct counters and chunks; lanes at the most wanted counter; the same, and lanes in the most wanted chunk,
-        of each group, summed.
+        of each group that arrives together, summed; requests.
     """
-    of_tile, of_chunk = wanted.together
-    tiles = chunks = depth = group_depth = lock_depth = most = chunk_most = k = begins = 0
     for lane in range(lanes):
-        if lane == begins:  # a group
-            begins += group
-            of_tile[:tiles] = 0
-            of_chunk[:chunks] = 0
-            group_depth, lock_depth, most, chunk_most = group_depth + most, lock_depth + chunk_most, 0, 0
-        if tile[lane] < 0:
-            continue
-        k = _find(wanted.tile, tiles, tile[lane], k)
-        if k == tiles:
-            chunk = tile[lane] * padding // CHUNK_WORDS
-            c = _find(wanted.chunk, chunks, chunk, 0)
-            if c == chunks:
-                wanted.chunk[c] = chunk
-                wanted.chunk_lanes[c] = 0
-                wanted.chunk_depth[c] = of_chunk[c] = 0
-                chunks += 1
-            wanted.tile[k] = tile[lane]
-            wanted.tile_lanes[k] = of_tile[k] = 0
-            wanted.tile_chunk[k] = c
+        word[lane] = tile[lane] * rule.padding
+    group = np.uint64(2**64 - 1) >> np.uint64(64 - rule.group)
+    tiles = chunks = depth = most = others = chunk_most = chunk_others = sent = 0
+    left = active_lanes(word, 0, lanes)
+    while left != np.uint64(0):
+        here = word[lowest_bit(left)]
+        in_chunk = lanes_near(word, 0, lanes, here, CHUNK_WORDS)
+        left &= ~in_chunk
+        chunk_depth, rest = 0, in_chunk
+        while rest != np.uint64(0):
+            same = lanes_near(word, 0, lanes, word[lowest_bit(rest)], 1)
+            rest &= ~same
             tiles += 1
-        wanted.tile_lanes[k] += 1
-        c = wanted.tile_chunk[k]
-        wanted.chunk_lanes[c] += 1
-        of_tile[k] += 1
-        of_chunk[c] += 1
-        wanted.chunk_depth[c] = max(wanted.chunk_depth[c], wanted.tile_lanes[k])
-        depth = max(depth, wanted.tile_lanes[k])
-        most, chunk_most = max(most, of_tile[k]), max(chunk_most, of_chunk[c])
-    return tiles, chunks, depth, group_depth + most, lock_depth + chunk_most
+            chunk_depth = max(chunk_depth, popcount(same))
+            most, others = max(most, popcount(same & group)), max(others, popcount(same & ~group))
+        chunks += 1
+        depth = max(depth, chunk_depth)
+        chunk_most = max(chunk_most, popcount(in_chunk & group))
+        chunk_others = max(chunk_others, popcount(in_chunk & ~group))
+        needed = chunk_depth if rule.merge == _SECTOR else popcount(in_chunk)
+        requests[here // CHUNK_WORDS] += needed
+        sent += needed
+    return tiles, chunks, depth, most + others, chunk_most + chunk_others, sent
 
 
 @kernel(lent=True)
-def send_requests(wanted: Wanted, chunks: int, merge: int, table: Any) -> int:
-    """Count the requests that leave the SM, every lane or what a merged chunk needs; add them to ``table`` by chunk."""
-    total = 0
-    for c in range(chunks):
-        sent = wanted.chunk_depth[c] if merge == _SECTOR else wanted.chunk_lanes[c]
-        table[wanted.chunk[c]] += sent
-        total += sent
-    return total
+def most_wanted(tile: Any, lanes: int) -> int:
+    """Count the lanes at the most wanted of some counters; parameters as of ``count_wanted``."""
+    most, left = 0, active_lanes(tile, 0, lanes)
+    while left != np.uint64(0):
+        same = lanes_near(tile, 0, lanes, tile[lowest_bit(left)], 1)
+        left &= ~same
+        most = max(most, popcount(same))
+    return most

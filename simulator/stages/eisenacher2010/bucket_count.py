@@ -17,7 +17,7 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from tilestamp.models.atomics import CHUNK_BYTES
-from tilestamp.models.bits import active_lanes, popcount
+from tilestamp.models.bits import active_lanes, lowest_bit, popcount
 from tilestamp.models.coalescing import contiguous, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -27,10 +27,8 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import (
     AtomicRule,
     atomic_rule,
+    count_wanted,
     keep_leaders,
-    list_wanted,
-    scratch,
-    send_requests,
 )
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles
 from tilestamp.simulator.work import Work
@@ -75,23 +73,20 @@ _E = BucketCountEvent
 
 
 @kernel(lent=True)
-def _place(slots: Any, count: Any, idx: Any) -> None:
-    """COUNT and IDX: one warp after the other, one slot after the other, the lowest lane first."""
-    patches = idx.shape[0]
-    warps, sides, lanes = slots.shape
-    for warp in range(warps):
-        first = warp * lanes
-        for slot in range(sides):
-            for lane in range(min(lanes, patches - first)):
-                tile = slots[warp, slot, lane]
-                if tile >= 0:
-                    idx[first + lane, slot] = count[tile]
-                    count[tile] += 1
+def _place(tile: Any, lanes: int, first: int, slot: int, count: Any, idx: Any) -> None:
+    """COUNT and IDX of one slot in one warp: the lowest lane first."""
+    active = active_lanes(tile, 0, lanes)
+    while active != np.uint64(0):
+        lane = np.uint64(lowest_bit(active))
+        active &= active - np.uint64(1)
+        here = np.uint64(tile[lane])
+        idx[np.uint64(first) + lane, slot] = count[here]
+        count[here] += 1
 
 
 @kernel(lent=True)
 def _count_atomic(
-    tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, wanted: Any, row: Any, chunk_requests: Any, leaders: Any
+    tile: Any, lanes: int, rule: AtomicRule, aggregate: bool, row: Any, chunk_requests: Any, leaders: Any, words: Any
 ) -> None:
     """Events of one slot in one warp."""
     active = popcount(active_lanes(tile, 0, lanes))
@@ -104,10 +99,10 @@ def _count_atomic(
         keep_leaders(tile, lanes, leaders)
         tile = leaders
         active = popcount(active_lanes(tile, 0, lanes))
-    counters, chunks, depth, group_depth, lock_depth = list_wanted(tile, lanes, rule.group, rule.padding, wanted)
+    counters, chunks, depth, group_depth, lock_depth, sent = count_wanted(tile, lanes, rule, words, chunk_requests)
     row[_E.ATOMIC] += 1
     row[_E.ATOMIC_LANES] += active
-    row[_E.ATOMIC_REQUESTS] += send_requests(wanted, chunks, rule.merge, chunk_requests)
+    row[_E.ATOMIC_REQUESTS] += sent
     row[_E.ATOMIC_CONFLICTS] += active - counters
     row[_E.ATOMIC_DEPTH] += depth
     row[_E.GROUP_DEPTH] += group_depth
@@ -137,7 +132,7 @@ def patch_traffic(
 
 
 @kernel
-def _find_tiles(
+def _count_blocks(
     part: int,
     parts: int,
     boxes: Any,
@@ -145,22 +140,24 @@ def _find_tiles(
     rule: AtomicRule,
     coalescing: Any,
     aggregate: bool,
-    slots: Any,
+    counts: Any,
+    idx: Any,
     table: Any,
     requests: Any,
 ) -> None:
-    """Tiles of all lanes and slots in the blocks of one part, and their events; a row of ``requests`` a part."""
+    """COUNT and IDX as the blocks of one part alone make them, and their events; ``counts`` has a row a part."""
     patches = boxes.shape[0]
     blocks = (patches + BLOCK - 1) // BLOCK
-    chunk_requests = requests[part]
-    wanted = scratch(rule.warp)
-    addresses = np.empty(rule.warp, np.int64)
+    count, chunk_requests = counts[part], requests[part]
+    slots, corners = np.empty((tiles.slots**2, rule.warp), np.int64), np.empty((4, rule.warp), np.int64)
+    addresses, words = np.empty(rule.warp, np.int64), np.empty(rule.warp, np.int64)
     traffic = patch_traffic(0, rule.warp, patches, tiles.slots, coalescing, addresses)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), rule.warp):
             lanes = min(rule.warp, patches - first)
-            tile = slots[first // rule.warp]
-            slot_tiles(boxes, first, lanes, tiles, tile)
+            slot_tiles(boxes, first, lanes, tiles, corners, slots)
+            for slot in range(tiles.slots**2):
+                _place(slots[slot], lanes, first, slot, count, idx)
             if table is not None:
                 row = table[block]
                 if lanes < rule.warp or tiles.slots > 2:  # else as aligned as every full warp
@@ -172,7 +169,27 @@ def _find_tiles(
                 row[_E.STORE_TRANSACTIONS] += traffic[2]
                 row[_E.STORE_BYTES] += traffic[3]
                 for slot in range(tiles.slots**2):
-                    _count_atomic(tile[slot], lanes, rule, aggregate, wanted, row, chunk_requests, addresses)
+                    _count_atomic(slots[slot], lanes, rule, aggregate, row, chunk_requests, addresses, words)
+
+
+@kernel
+def _add_before(part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, before: Any, idx: Any) -> None:
+    """Add to each place what the parts of ``_count_blocks`` before its own have put into the tile, a row a part."""
+    patches, owner, owners = boxes.shape[0], 0, before.shape[0]
+    blocks = (patches + BLOCK - 1) // BLOCK
+    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
+    begin = blocks // owners  # nothing is before the first part
+    for block in range(begin + (blocks - begin) * part // parts, begin + (blocks - begin) * (part + 1) // parts):
+        while (owner + 1) * blocks // owners <= block:
+            owner += 1
+        for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), warp):
+            lanes = min(warp, patches - first)
+            slot_tiles(boxes, first, lanes, tiles, corners, slots)
+            mine = idx[first : first + lanes]
+            for slot in range(tiles.slots**2):
+                for lane in range(lanes):
+                    if slots[slot, lane] >= 0:
+                        mine[lane, slot] += before[owner, slots[slot, lane]]
 
 
 class Counted(NamedTuple):
@@ -213,15 +230,16 @@ def bucket_count(
     """
     rule = atomic_rule(simt, padding)
     blocks, parts = -(-len(boxes) // BLOCK), get_num_threads()
-    slots = np.empty((-(-len(boxes) // rule.warp), tiles.slots**2, rule.warp), np.int64)
     table = np.zeros((blocks, len(_E)), np.int64) if counting else None
     chunks = -(-tiles.total * padding * WORD_BYTES // CHUNK_BYTES) if counting else 0
     requests = np.zeros((parts, chunks), np.int64)
     coalescing = int(simt.coalescing)
-    for_parts(_find_tiles, parts, boxes, tiles, rule, coalescing, aggregate, slots, table, requests)
-    count = np.zeros(tiles.total, np.uint32)
+    counts = np.zeros((parts, tiles.total), np.uint32)
     idx = np.zeros((len(boxes), tiles.slots**2), np.uint32)
-    _place(slots, count, idx)
+    for_parts(_count_blocks, parts, boxes, tiles, rule, coalescing, aggregate, counts, idx, table, requests)
+    ends = np.cumsum(counts, axis=0, dtype=np.uint32)
+    count = ends[-1]
+    for_parts(_add_before, parts, boxes, tiles, rule.warp, ends - counts, idx)
     if table is None:
         return StageResult(Counted(count, idx))
     works = _init_work(tiles, padding, simt), _address_work(len(boxes), tiles, table, requests.sum(axis=0), aggregate)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bits import active_lanes, popcount
+from tilestamp.models.bits import active_lanes, lowest_bit, popcount
 from tilestamp.models.coalescing import touched_lines, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
@@ -22,7 +22,7 @@ from tilestamp.simulator.stages.eisenacher2010.bucket_count import (
     WORD_BYTES,
     patch_traffic,
 )
-from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles, tile_range
+from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, slot_tiles
 from tilestamp.simulator.work import Work
 
 
@@ -50,19 +50,20 @@ _E = BucketWriteEvent
 
 
 @kernel(lent=True)
-def _write(boxes: Any, tiles: Tiles, start: Any, idx: Any, lists: Any) -> None:
-    """Fill LISTS."""
-    for p in range(boxes.shape[0]):
-        x0, y0, x1, y1 = tile_range(boxes[p], tiles)
-        for y in range(y0, y1 + 1):
-            for x in range(x0, x1 + 1):
-                lists[start[y * tiles.columns + x] + idx[p, (y - y0) * tiles.slots + x - x0]] = p
+def _write_slot(tile: Any, first: int, lanes: int, slot: int, start: Any, idx: Any, lists: Any, addresses: Any) -> None:
+    """Fill LISTS from one slot of one warp; leaves where: a byte address a lane, -1 where it writes nothing."""
+    addresses[:lanes] = -1
+    active = active_lanes(tile, 0, lanes)
+    while active != np.uint64(0):
+        lane = lowest_bit(active)
+        active &= active - np.uint64(1)
+        place = np.int64(start[tile[lane]]) + np.int64(idx[first + lane, slot])
+        lists[place] = first + lane
+        addresses[lane] = place * WORD_BYTES
 
 
 @kernel(lent=True)
-def _count_slot(
-    tile: Any, first: int, lanes: int, slot: int, start: Any, idx: Any, coalescing: Any, addresses: Any, row: Any
-) -> None:
+def _count_slot(tile: Any, lanes: int, last: bool, coalescing: Any, counters: Any, addresses: Any, row: Any) -> None:
     """Count loads of START and stores to LISTS of one slot in one warp, at their real addresses."""
     active = popcount(active_lanes(tile, 0, lanes))
     row[_E.SLOT_WARPS] += 1
@@ -70,18 +71,15 @@ def _count_slot(
         return
     row[_E.DIVERGENT_WARPS] += active < lanes
     row[_E.WRITE_WARPS] += 1
-    if slot == idx.shape[1] - 1:
+    if last:
         row[_E.LAST_WRITE_WARPS] += 1
         row[_E.LAST_WRITE_LANES] += active
     row[_E.WRITE_LANES] += active
     for lane in range(lanes):
-        addresses[lane] = max(tile[lane] * WORD_BYTES, -1)
-    count, size = transactions(addresses, lanes, WORD_BYTES, coalescing)
+        counters[lane] = max(tile[lane] * WORD_BYTES, -1)
+    count, size = transactions(counters, lanes, WORD_BYTES, coalescing)
     row[_E.LOAD_TRANSACTIONS] += count
     row[_E.LOAD_BYTES] += size
-    for lane in range(lanes):
-        if tile[lane] >= 0:
-            addresses[lane] = (np.int64(start[tile[lane]]) + np.int64(idx[first + lane, slot])) * WORD_BYTES
     count, size = transactions(addresses, lanes, WORD_BYTES, coalescing)
     row[_E.STORE_TRANSACTIONS] += count
     row[_E.STORE_BYTES] += size
@@ -89,29 +87,43 @@ def _count_slot(
 
 
 @kernel
-def _count_blocks(
-    part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, start: Any, idx: Any, coalescing: Any, table: Any
+def _write_blocks(
+    part: int,
+    parts: int,
+    boxes: Any,
+    tiles: Tiles,
+    warp: int,
+    start: Any,
+    idx: Any,
+    coalescing: Any,
+    lists: Any,
+    table: Any,
 ) -> None:
-    """Events of the blocks of one part."""
-    patches, blocks = boxes.shape[0], table.shape[0]
-    slots = np.empty((tiles.slots**2, warp), np.int64)
-    addresses = np.empty(warp, np.int64)
+    """Fill LISTS from the blocks of one part, and count their events."""
+    patches = boxes.shape[0]
+    blocks = (patches + BLOCK - 1) // BLOCK
+    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
+    addresses, counters = np.empty(warp, np.int64), np.empty(warp, np.int64)
     traffic = patch_traffic(0, warp, patches, tiles.slots, coalescing, addresses)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
-        row = table[block]
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), warp):
             lanes = min(warp, patches - first)
-            if lanes < warp or tiles.slots > 2:  # else as aligned as every full warp
-                traffic = patch_traffic(first, lanes, patches, tiles.slots, coalescing, addresses)
-            row[_E.PATCH_WARPS] += 1
-            row[_E.PATCH_LANES] += lanes
-            row[_E.LOAD_TRANSACTIONS] += traffic[0] + traffic[2]  # IDX is read as it was written
-            row[_E.LOAD_BYTES] += traffic[1] + traffic[3]
-            row[_E.BOX_BYTES] += traffic[1]
-            row[_E.IDX_BYTES] += traffic[3]
-            slot_tiles(boxes, first, lanes, tiles, slots)
+            slot_tiles(boxes, first, lanes, tiles, corners, slots)
+            if table is not None:
+                row = table[block]
+                if lanes < warp or tiles.slots > 2:  # else as aligned as every full warp
+                    traffic = patch_traffic(first, lanes, patches, tiles.slots, coalescing, addresses)
+                row[_E.PATCH_WARPS] += 1
+                row[_E.PATCH_LANES] += lanes
+                row[_E.LOAD_TRANSACTIONS] += traffic[0] + traffic[2]  # IDX is read as it was written
+                row[_E.LOAD_BYTES] += traffic[1] + traffic[3]
+                row[_E.BOX_BYTES] += traffic[1]
+                row[_E.IDX_BYTES] += traffic[3]
             for slot in range(tiles.slots**2):
-                _count_slot(slots[slot], first, lanes, slot, start, idx, coalescing, addresses, row)
+                _write_slot(slots[slot], first, lanes, slot, start, idx, lists, addresses)
+                if table is not None:
+                    last = slot == tiles.slots**2 - 1
+                    _count_slot(slots[slot], lanes, last, coalescing, counters, addresses, table[block])
 
 
 def bucket_write(
@@ -146,12 +158,11 @@ def bucket_write(
     works : one, a row a block
     """
     lists = np.empty(int(count.sum(dtype=np.int64)), np.uint32)
-    _write(boxes, tiles, start, idx, lists)
-    if not counting:
+    blocks, coalescing = -(-len(boxes) // BLOCK), int(simt.coalescing)
+    table = np.zeros((blocks, len(_E)), np.int64) if counting else None
+    for_parts(_write_blocks, parts_of(blocks), boxes, tiles, simt.warp, start, idx, coalescing, lists, table)
+    if table is None:
         return StageResult(lists)
-    table = np.zeros((-(-len(boxes) // BLOCK), len(_E)), np.int64)
-    parts = parts_of(len(table))
-    for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
     streams = _streams(table, len(boxes), tiles, count)
     work = Work(
         stage="bucket_write",

@@ -18,7 +18,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import list_wanted, scratch
+from tilestamp.simulator.stages.eisenacher2010.bucket_conflicts import most_wanted
 from tilestamp.simulator.stages.eisenacher2010.tile_range import Tiles, tile_range
 from tilestamp.simulator.work import Work
 
@@ -77,7 +77,7 @@ def _slots(
 
 
 @kernel(lent=True)
-def _count_slot(tile: Any, lanes: int, wanted: Any, row: Any) -> int:
+def _count_slot(tile: Any, lanes: int, row: Any) -> int:
     """Events of the shared atomics of one slot; lanes that have one."""
     active = 0
     for lane in range(lanes):
@@ -86,7 +86,7 @@ def _count_slot(tile: Any, lanes: int, wanted: Any, row: Any) -> int:
     if active > 0:
         row[_E.SHARED_ATOMIC] += 1
         row[_E.SLOT_LANES] += active
-        row[_E.BANK_REPLAYS] += list_wanted(tile, lanes, lanes, 1, wanted)[2] - 1
+        row[_E.BANK_REPLAYS] += most_wanted(tile, lanes) - 1
     return active
 
 
@@ -98,7 +98,7 @@ def _refine(
     """Two passes over the list of each coarse tile; blocks take their room one after the other."""
     sides = coarse.size // fine.size
     slots, grids = np.empty((fine.slots * fine.slots, warp), np.int64), np.empty(warp, np.int64)
-    addresses, wanted = np.empty(warp, np.int64), scratch(warp)
+    addresses = np.empty(warp, np.int64)
     taken, cursor = np.zeros(fine_count.size, np.int64), np.int64(0)
     for block in range(coarse_count.size):
         left, top = block % coarse.columns * sides, block // coarse.columns * sides
@@ -113,7 +113,7 @@ def _refine(
                     _count_loads(base, lanes, grids, coalescing, addresses, row)
                 for slot in range(fine.slots * fine.slots):
                     tile = slots[slot]
-                    active = _count_slot(tile, lanes, wanted, row)
+                    active = _count_slot(tile, lanes, row)
                     for lane in range(lanes):
                         addresses[lane] = -1
                         if tile[lane] < 0:

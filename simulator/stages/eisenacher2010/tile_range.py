@@ -63,11 +63,17 @@ def tile_range(box: Any, tiles: Any) -> tuple[Any, Any, Any, Any]:
 
 
 @kernel(lent=True)
-def slot_tiles(boxes: Any, first: int, lanes: int, tiles: Tiles, slots: Any) -> None:
-    """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes)."""
+def slot_tiles(boxes: Any, first: int, lanes: int, tiles: Tiles, corners: Any, slots: Any) -> None:
+    """List the tile of each lane of a warp in each slot, -1 where it has none: ``slots``, (slots**2, >= lanes).
+
+    ``corners``, (4, >= lanes) int64, is scratch. Loops over lanes alone, so that compiled code takes several at once.
+    """
+    mine, left, top, right, bottom = boxes[first : first + lanes], corners[0], corners[1], corners[2], corners[3]
     for lane in range(lanes):
-        x0, y0, x1, y1 = tile_range(boxes[first + lane], tiles)
-        for j in range(tiles.slots):
-            for i in range(tiles.slots):
-                inside = x0 + i <= x1 and y0 + j <= y1
-                slots[j * tiles.slots + i, lane] = (y0 + j) * tiles.columns + x0 + i if inside else -1
+        left[lane], top[lane], right[lane], bottom[lane] = tile_range(mine[lane], tiles)
+    for j in range(tiles.slots):
+        for i in range(tiles.slots):
+            slot = slots[j * tiles.slots + i]
+            for lane in range(lanes):
+                x, y = left[lane] + i, top[lane] + j
+                slot[lane] = y * tiles.columns + x if x <= right[lane] and y <= bottom[lane] else -1
