@@ -200,8 +200,7 @@ def _make_frame(pieces: Pieces, width: int, height: int, packing: str, colors: N
         words = np.full((height, width, 1), EMPTY, np.uint64)
         for_parts(_draw_strip, WORKERS, pieces, colors, words, None, tied)
         payload, depth = words.view(np.uint32).reshape(height, width, 2).transpose(2, 0, 1)
-        ids = payload.view(np.int32) - np.int32(1)
-        ids[payload == EMPTY & 0xFFFFFFFF] = -1
+        ids = np.maximum(payload.view(np.int32) - np.int32(1), np.int32(-1))  # an empty pixel's payload is -1
         return FreePipeFrame(ids, depth.copy(), None, tied, np.zeros_like(tied))
     wide = np.full((height, width, 2), EMPTY, np.uint64)
     halves = np.full((height, width, 2), 2**32 - 1, np.uint32)

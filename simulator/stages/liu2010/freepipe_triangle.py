@@ -121,7 +121,7 @@ def _project(vertex: Any, width: int, height: int, bits: int, place: Any) -> Any
     return vertex[2] * r
 
 
-@kernel(error_model="numpy", lent=True)
+@kernel(error_model="numpy", lent=True, inline=True)
 def _piece(places: Any, depths: Any, i: int, j: int, k: int, size: Any, bits: int, pieces: Any, p: int) -> None:
     """Find box and depth plane of the triangle of three projected vertices, and which way it faces."""
     half = 1 << (bits - 1)
@@ -244,9 +244,10 @@ def make_pieces(
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(positions)):
         raise TilestampError(f"a triangle names a vertex outside 0..{len(positions) - 1}")
     parts = parts_of(len(triangles), _PART_TRIANGLES)
-    kind, count = np.zeros(len(triangles), np.uint8), np.zeros(len(triangles), np.int64)
+    kind, count = np.empty(len(triangles), np.uint8), np.empty(len(triangles), np.uint8)
     for_parts(_classify_part, parts, positions, triangles, band, kind, count)
-    first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
+    first = np.zeros(len(triangles) + 1, np.int64)
+    np.cumsum(count, out=first[1:])
     total = int(first[-1])
     corner, box = np.empty((total, 6), np.int32), np.empty((total, 4), np.int32)
     pieces = Pieces(kind, first, corner, box, np.empty(total, np.int8), np.empty((total, 3), np.float32))
