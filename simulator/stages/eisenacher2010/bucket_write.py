@@ -153,16 +153,7 @@ def bucket_write(
     parts = parts_of(len(table))
     for_parts(_count_blocks, parts, boxes, tiles, simt.warp, start, idx, int(simt.coalescing), table)
     streams = _streams(table, len(boxes), tiles, count)
-    work = Work(
-        stage="bucket_write",
-        kernel="bucket_write",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=streams,
-        variant=tiles.variant,
-    )
+    work = Work("bucket_write", _E, table, BLOCK, streams=streams, variant=tiles.variant)
     return StageResult(lists, (work,))
 
 
