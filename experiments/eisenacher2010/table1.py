@@ -1,6 +1,7 @@
 """Table 1: bucketing 270 k sub-patches by tiles of 4, 8, 16 and 32 pixels (Eisenacher & Loop 2010)."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -74,36 +75,14 @@ def _cells(line: "pd.Series[float]", made: Run) -> list[Cell]:
     written = made.frame.facts["patches_written"]
     per_patch = written / made.frame.facts["subpatches"]
     row = f"{tile}x{tile}"
+    cell = partial(Cell, row, frame=KILLEROO)
+    parts = ("all tiles", "sub-patches"), (row, "patches written")
+    calculated, wrote = (stage_ms(made, stage) for stage in ("bucket_count", "bucket_write"))
     return [
-        Cell(
-            row,
-            "address calculation",
-            "ms",
-            published=line.address_calc_ms,
-            ours=stage_ms(made, "bucket_count"),
-            aim=TIME_AIM,
-            frame=KILLEROO,
-        ),
-        Cell(
-            row,
-            "bucket write",
-            "ms",
-            published=line.bucket_write_ms,
-            ours=stage_ms(made, "bucket_write"),
-            aim=TIME_AIM,
-            frame=KILLEROO,
-        ),
-        Cell(row, "patches written", "", published=line.patches_written, ours=written, aim=COUNT_AIM, frame=KILLEROO),
-        Cell(
-            row,
-            "tiles per patch",
-            "",
-            published=line.tiles_per_patch,
-            ours=per_patch,
-            aim=COUNT_AIM,
-            frame=KILLEROO,
-            of=(("all tiles", "sub-patches"), (row, "patches written")),
-        ),
+        cell("address calculation", "ms", published=line.address_calc_ms, ours=calculated, aim=TIME_AIM),
+        cell("bucket write", "ms", published=line.bucket_write_ms, ours=wrote, aim=TIME_AIM),
+        cell("patches written", "", published=line.patches_written, ours=written, aim=COUNT_AIM),
+        cell("tiles per patch", "", published=line.tiles_per_patch, ours=per_patch, aim=COUNT_AIM, of=parts),
     ]
 
 

@@ -100,7 +100,6 @@ def run(progress: Progress) -> Result:
         figures=_figures(table, worst),
         charts=CHARTS,
         notes=notes(table, doubles),
-        warnings=[],
         tables={"methods": table, "double-hits": doubles},
     )
 

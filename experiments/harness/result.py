@@ -84,9 +84,11 @@ class Cell:
         return "time" if self.unit.partition("/")[0].partition(",")[0] in TIME_UNITS else "count"
 
 
-def reported(row: str, column: str, unit: str, ours: float | str, frame: str = "") -> Cell:
-    """A cell beside which nothing is published."""
-    return Cell(row, column, unit, published=None, ours=ours, status="reported", frame=frame)
+def reported(
+    row: str, column: str, unit: str, ours: float | str, frame: str = "", published: float | str | None = None
+) -> Cell:
+    """A cell without an aim: mostly nothing is published beside it."""
+    return Cell(row, column, unit, published=published, ours=ours, status="reported", frame=frame)
 
 
 def _nothing(published: float | str) -> bool:

@@ -6,7 +6,7 @@ import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Result
+from tilestamp.experiments.harness.result import Cell, Result, reported
 from tilestamp.experiments.laine2011.generated import (
     PIPELINES,
     VARIABLE,
@@ -108,13 +108,6 @@ def statistic_cells(scene: Statistics) -> list[Cell]:
     survivors = visible - counters["TriangleSetup / Between pixels cull"]
     pixels = counters["TriangleSetup / Avg. samples / tri"] * survivors / visible
     return [
-        Cell(
-            scene.name,
-            "visible triangles",
-            "%",
-            published=None if scene.assumed else scene.visible,
-            ours=visible,
-            status="reported",
-        ),
-        Cell(scene.name, "pixels a triangle", "", published=scene.pixels, ours=pixels, status="reported"),
+        reported(scene.name, "visible triangles", "%", visible, published=None if scene.assumed else scene.visible),
+        reported(scene.name, "pixels a triangle", "", pixels, published=scene.pixels),
     ]

@@ -57,7 +57,6 @@ def run(progress: Progress) -> Result:
             title="Table 3: Buddha",
             source=SOURCE,
             cells=[],
-            figures=[],
             notes=notes,
             warnings=[warning],
         )

@@ -68,7 +68,6 @@ def run(progress: Callable[[str], None]) -> Result:
         source=SOURCE,
         cells=cells,
         answer=_answer(cells),
-        figures=[],
         notes=notes,
         warnings=missing(absent),
     )

@@ -83,7 +83,6 @@ def run(progress: Callable[[str], None]) -> Result:
         title="H200, one scene left out of the fit",
         source=SOURCE,
         cells=cells,
-        figures=[],
         notes=_notes(cells),
         warnings=left_out,
     )

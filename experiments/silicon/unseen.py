@@ -61,7 +61,6 @@ def run(progress: Callable[[str], None]) -> Result:
         title="H200, scenes that nothing was fitted to",
         source=SOURCE,
         cells=cells_of(table),
-        figures=[],
         notes=notes,
         warnings=left_out,
         tables=tables,

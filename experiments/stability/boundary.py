@@ -140,7 +140,6 @@ def atlas_result(
         answer=_answer(boundaries),
         figures=list(figures),
         notes=[*sentences, *_unbroken(boundaries), *notes],
-        warnings=[],
         tables=tables,
     )
 

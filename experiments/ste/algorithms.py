@@ -71,7 +71,6 @@ def run(progress: Callable[[str], None]) -> Result:
         answer=_answer(table),
         figures=figures,
         notes=notes,
-        warnings=[],
         tables={"runs": table},
     )
 

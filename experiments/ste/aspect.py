@@ -70,7 +70,6 @@ def run(progress: Callable[[str], None]) -> Result:
         f"{table.gain[table.aspect == 1].min():.2f} and {table.gain[table.aspect == 1].max():.2f} times.",
         figures=[figure],
         notes=notes,
-        warnings=[],
         tables={"runs": table},
     )
 

@@ -92,7 +92,6 @@ def run(progress: Callable[[str], None]) -> Result:
         answer=notes[0],
         figures=figures,
         notes=notes,
-        warnings=[],
         tables={"runs": table},
     )
 

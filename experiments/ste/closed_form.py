@@ -87,7 +87,6 @@ def run(progress: Callable[[str], None]) -> Result:
         answer=f"Yes in {all_} of {len(table)} cells, by intervals that hold for all cells together with 95 %.",
         figures=[figure],
         notes=notes,
-        warnings=[],
         tables={"intervals": table},
     )
 

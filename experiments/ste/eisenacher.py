@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result, reported
+from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.ste.closed_form import expected
 from tilestamp.experiments.ste.setting import mean_area, random_polygons
 from tilestamp.models.errors import TilestampError
@@ -47,7 +47,7 @@ def run(progress: Callable[[str], None]) -> Result:
             warnings.append(f"{name} is left out: {error}")
     for row in rows:
         place = f"{row['scene']}, boxes under {row['bound']:g} px ({row['area']:.2f} px a quad)"
-        cells.append(Cell(place, "STE of the 8x8 stamp", "%", published=QUOTED, ours=row["ste"], status="reported"))
+        cells.append(reported(place, "STE of the 8x8 stamp", "%", row["ste"], published=QUOTED))
     notes = [
         f"A square of {_area_at(QUOTED / 100):.2f} pixels gives 2 % with 8x8-pixel stamps (closed form).",
         "The quoted 2 % is a prediction in the literature, so no error against it is averaged.",

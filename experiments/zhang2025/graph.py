@@ -88,8 +88,6 @@ def run(progress: Callable[[str], None]) -> Result:
             title="Stream against graph",
             source=SOURCE,
             cells=[],
-            figures=[],
-            notes=[],
             warnings=[warning],
         )
     machine = load_machine(MACHINE)

@@ -42,7 +42,6 @@ def run(progress: Callable[[str], None]) -> Result:
             title="Ten kernels",
             source=SOURCE,
             cells=[],
-            figures=[],
             notes=notes,
             warnings=[warning],
         )

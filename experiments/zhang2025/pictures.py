@@ -46,8 +46,6 @@ def run(progress: Callable[[str], None]) -> Result:
             title="Features off and on",
             source=source,
             cells=[],
-            figures=[],
-            notes=[],
             warnings=[str(error)],
         )
     matrix = CAMERA.matrix(SIZE, SIZE)

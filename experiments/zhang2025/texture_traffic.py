@@ -112,6 +112,5 @@ def run(progress: Callable[[str], None]) -> Result:
         answer=_answer(cells),
         figures=[figure],
         notes=notes,
-        warnings=[],
         tables={"traffic": table},
     )

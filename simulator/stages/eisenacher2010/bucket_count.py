@@ -261,15 +261,7 @@ def _init_work(tiles: Tiles, padding: int, simt: Simt) -> Work:
     stream = Stream(
         "COUNT", "store", int(table[:, BucketInitEvent.STORE_BYTES].sum()), words * WORD_BYTES, partial_lines=0
     )
-    return Work(
-        stage="bucket_count",
-        kernel="bucket_init",
-        events=BucketInitEvent,
-        table=table,
-        grid=len(sizes),
-        block=BLOCK,
-        streams=(stream,),
-    )
+    return Work("bucket_count", BucketInitEvent, table, BLOCK, kernel="bucket_init", grid=len(sizes), streams=(stream,))
 
 
 def _address_work(
@@ -292,12 +284,11 @@ def _address_work(
         ),
     )
     return Work(
-        stage="bucket_count",
+        "bucket_count",
+        _E,
+        table,
+        BLOCK,
         kernel="address_calculation",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
         streams=streams,
         atomic_requests=requests,
         variant=tiles.variant + " aggregated" * aggregate,

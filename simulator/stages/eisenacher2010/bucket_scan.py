@@ -91,16 +91,7 @@ def _buffers(level: int) -> tuple[str, str]:
 
 def _work(kernel: str, size: int, table: NDArray[np.int64], shared_bytes: int, streams: tuple[Stream, ...]) -> Work:
     blocks = -(-size // ELEMENTS)
-    return Work(
-        stage="bucket_scan",
-        kernel=kernel,
-        events=_E,
-        table=table,
-        grid=blocks,
-        block=BLOCK,
-        shared_bytes=shared_bytes,
-        streams=streams,
-    )
+    return Work("bucket_scan", _E, table, BLOCK, kernel=kernel, grid=blocks, shared_bytes=shared_bytes, streams=streams)
 
 
 def _blocks(size: int, simt: Simt) -> NDArray[np.int64]:

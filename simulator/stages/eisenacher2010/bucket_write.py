@@ -164,16 +164,7 @@ def bucket_write(
     if table is None:
         return StageResult(lists)
     streams = _streams(table, len(boxes), tiles, count)
-    work = Work(
-        stage="bucket_write",
-        kernel="bucket_write",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=streams,
-        variant=tiles.variant,
-    )
+    work = Work("bucket_write", _E, table, BLOCK, streams=streams, variant=tiles.variant)
     return StageResult(lists, (work,))
 
 

@@ -70,16 +70,7 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
         Stream("grids", "store", stored - boxes, number * vertices * VERTEX_BYTES, partial_lines=0),
         Stream("boxes", "store", boxes, boxes, partial_lines=0),
     )
-    return Work(
-        stage="dice",
-        kernel="dice",
-        events=_E,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        shared_bytes=VERTICES * POINT_BYTES * per_block,
-        streams=streams,
-    )
+    return Work("dice", _E, table, BLOCK, shared_bytes=VERTICES * POINT_BYTES * per_block, streams=streams)
 
 
 def _points(patch: NDArray[np.int32], per_block: int, simt: Simt) -> NDArray[np.int64]:

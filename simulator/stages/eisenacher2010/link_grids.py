@@ -194,6 +194,4 @@ def _work(name: str, table: NDArray[np.int64], slots: int) -> Work:
             Stream("links before", "store", links, links, partial_lines=0),
             Stream("links after", "store", int(total[_E.STORE_BYTES]) - links, links),
         ]
-    return Work(
-        stage="link_grids", kernel=name, events=_E, table=table, grid=len(table), block=BLOCK, streams=tuple(streams)
-    )
+    return Work("link_grids", _E, table, BLOCK, kernel=name, streams=tuple(streams))

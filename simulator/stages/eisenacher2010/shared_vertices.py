@@ -174,7 +174,4 @@ def _work(
         Stream("links after", "load", number * LINKS_BYTES, number * LINKS_BYTES),
         Stream("grids", "store", stored, number * side**2 * VERTEX_BYTES),
     )
-    return Work(
-        stage="dice", kernel="dice_shared", events=_E, table=table, grid=len(table), block=BLOCK,
-        shared_bytes=plain.shared_bytes, streams=streams,
-    )  # fmt: skip
+    return Work("dice", _E, table, BLOCK, kernel="dice_shared", shared_bytes=plain.shared_bytes, streams=streams)

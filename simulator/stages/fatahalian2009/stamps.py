@@ -17,6 +17,7 @@ from tilestamp.models.coalescing import contiguous
 from tilestamp.models.counters import shown
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
+from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
@@ -30,16 +31,18 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
+    blocks,
     count_hits,
     keep_nearest,
     on_screen,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
+from tilestamp.simulator.work import Work
 
 Touch = Literal["box", "polygon"]
 CHUNK = 256  # polygons that a warp draws from the queue
+WARPS = 4  # in a block
 
 
 @shown(*SAMPLE_COUNTERS)
@@ -101,8 +104,25 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
     units = -(-len(polygons.patch) // CHUNK)
     table = np.zeros((units, len(StampsEvent)), np.int64)
     _stamps(polygons.vertices, samples, shape, Simt(*map(int, simt)), table)
-    streams = sample_streams(polygons.vertices.nbytes, samples, StampsEvent, table)
-    work = warp_queue("stamps", StampsEvent, table, simt, streams=streams, atomic_requests=samples.requests)
+    loaded = int(table[:, StampsEvent.LOAD_BYTES].sum())
+    written = int(table[:, StampsEvent.ATOMIC_REQUESTS].sum()) * 32
+    streams = (
+        Stream("micropolygons", "load", loaded, polygons.vertices.nbytes),
+        Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
+    )
+    grid = blocks(simt, WARPS)
+    work = Work(
+        stage="stamps",
+        kernel="stamps",
+        events=StampsEvent,
+        table=table,
+        grid=grid,
+        block=WARPS * simt.warp,
+        shared_bytes=0,
+        dispatch="warp_queue",
+        streams=streams,
+        atomic_requests=samples.requests,
+    )
     return StageResult(samples, (work,))
 
 

@@ -68,21 +68,14 @@ def pixel_shader_work(ids: NDArray[np.int32], triangles: NDArray[np.int32], simt
     seen = np.unique(ids[ids >= 0])
     corners = len(np.unique(triangles[seen]))
     pixels = len(lanes) * BLOCK
-    return Work(
-        stage="pixel_shader",
-        kernel="pixelShader",
-        events=PixelShaderEvent,
-        table=table,
-        grid=len(table),
-        block=BLOCK,
-        streams=(
-            Stream("ids", "load", pixels * ID_BYTES, pixels * ID_BYTES),
-            Stream("triangles", "load", int(gathered.sum()) // 4 * SECTOR, len(seen) * INDEX_BYTES),
-            Stream("positions", "load", int(gathered.sum()) * 3 // 4 * SECTOR, corners * POSITION_BYTES),
-            Stream("rast", "store", pixels * RAST_BYTES, pixels * RAST_BYTES, partial_lines=0),
-            Stream("rast_db", "store", pixels * RAST_BYTES, pixels * RAST_BYTES, partial_lines=0),
-        ),
+    streams = (
+        Stream("ids", "load", pixels * ID_BYTES, pixels * ID_BYTES),
+        Stream("triangles", "load", int(gathered.sum()) // 4 * SECTOR, len(seen) * INDEX_BYTES),
+        Stream("positions", "load", int(gathered.sum()) * 3 // 4 * SECTOR, corners * POSITION_BYTES),
+        Stream("rast", "store", pixels * RAST_BYTES, pixels * RAST_BYTES, partial_lines=0),
+        Stream("rast_db", "store", pixels * RAST_BYTES, pixels * RAST_BYTES, partial_lines=0),
     )
+    return Work("pixel_shader", PixelShaderEvent, table, BLOCK, kernel="pixelShader", streams=streams)
 
 
 def _by_warp(ids: NDArray[np.int32], warp: int) -> NDArray[np.int32]:

@@ -194,7 +194,4 @@ def _resolve_work(table: NDArray[np.int64], lists: FragmentLists, simt: Simt) ->
         Stream("fragment_lists", "load", read, max(each * kept, 1)),
         Stream("pixels", "store", pixels, pixels, partial_lines=0),
     )
-    return Work(
-        stage="resolve", kernel="resolveLists", events=E, table=table, grid=len(table), block=BLOCK, streams=streams,
-        variant=lists.layout,
-    )  # fmt: skip
+    return Work("resolve", E, table, BLOCK, kernel="resolveLists", streams=streams, variant=lists.layout)

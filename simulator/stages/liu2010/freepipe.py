@@ -254,13 +254,4 @@ def freepipe_work(
 ) -> Work:
     """Work of the kernel, a row a block."""
     kernel = "freepipe_early" if early else "freepipe"
-    return Work(
-        stage="freepipe",
-        kernel=kernel,
-        events=FreePipeEvent,
-        table=table,
-        grid=len(table),
-        block=block,
-        streams=streams,
-        atomic_requests=requests,
-    )
+    return Work("freepipe", FreePipeEvent, table, block, kernel=kernel, streams=streams, atomic_requests=requests)
