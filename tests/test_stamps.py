@@ -9,8 +9,9 @@ from tilestamp.models.simt import AtomicMerge, Coalescing, Simt
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS, sample_positions
-from tilestamp.simulator.stages.fatahalian2009.stamps import CHUNK, StampsEvent, stamp_shape, stamps
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
 from tilestamp.simulator.stages.fatahalian2009.stamps_count import count_tests
+from tilestamp.simulator.stages.fatahalian2009.stamps_events import CHUNK, StampsEvent
 
 WIDTH, HEIGHT = 13, 9
 GT200 = Simt(32, Coalescing.HALF_WARP_SEGMENTS, 16, 16, AtomicMerge.NONE, 30)

@@ -103,6 +103,12 @@ def _edge(x0: int, y0: int, x1: int, y1: int, sign: int, edges: Any, row: int) -
     edges[row, 3] = rule if sign != 0 else 0
 
 
+@kernel(lent=True, inline=True)
+def in_box(boxes: Any, at_x: int, at_y: int) -> bool:
+    """Whether a sample lies in the polygon's own box: no other can be covered."""
+    return bool(boxes[0, 0] <= at_x <= boxes[0, 2] and boxes[0, 1] <= at_y <= boxes[0, 3])
+
+
 @kernel(lent=True)
 def covering_triangle(edges: Any, x: int, y: int) -> int:
     """Triangle of the polygon (0 or 1) that covers the sample, -1 if none does: one sample test."""

@@ -20,13 +20,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
-    covering_triangle,
-    depth_at,
-    set_edges,
-    set_up,
-    snap,
-)
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     blocks,
@@ -40,6 +34,7 @@ from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
 WARPS = 4  # in a block
+STEPS = 64  # that a lane walks ahead before the others do
 CORNER_BYTES = 28  # start, end and circle of confusion of a vertex
 MOST_SAMPLES = 1024  # a pixel
 
@@ -207,7 +202,7 @@ def empty_work(kernel: str, simt: Simt) -> Work:
     )
 
 
-@kernel
+@kernel(lent=True)
 def begin_warp(first: int, last: int, corners: int, simt: Simt, row: Any) -> None:
     """Count the loads of a warp's polygons, first..last-1."""
     row[MotionEvent.WARPS] += 1
@@ -231,14 +226,6 @@ def count_atomic(samples: Samples, addresses: Any, hits: int, simt: Simt, row: A
         row[MotionEvent.ATOMIC_DEPTH] += depth
 
 
-@kernel
-def end_test(samples: Samples, active: int, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
-    """Count one warp execution of the sample test, and the atomics of its hits."""
-    row[MotionEvent.TEST_WARPS] += 1
-    row[MotionEvent.SAMPLE_TESTS] += active
-    count_atomic(samples, addresses, hits, simt, row)
-
-
 @kernel(lent=True)
 def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, polygon: Any) -> None:
     """Write polygon p as it stands at a time and a lens point to ``polygon`` (3 or 4, 3)."""
@@ -249,31 +236,16 @@ def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, poly
         polygon[k, 1] += blur[p, k] * v
 
 
-@kernel
-def test_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
-    """One sample test of the polygon that is set up; returns the byte address of a hit's atomic, -1 for none."""
+@kernel(lent=True)
+def hit_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
+    """Test a sample of the polygon that is set up; returns the byte address of a hit's atomic, -1 for none."""
     triangle = covering_triangle(setup[0], at_x, at_y)
-    samples.tests[y, x] += 1
     if triangle < 0:
         return -1
     return keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
 
 
 @kernel(lent=True)
-def hit_sample(p: int, polygon: Any, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
-    """Test a sample of a placed polygon that is not set up; returns the byte address of a hit's atomic, -1 for none."""
-    edges, boxes, depths, snapped = setup
-    snap(polygon, boxes, snapped)
-    if at_x < boxes[0, 0] or at_y < boxes[0, 1] or at_x > boxes[0, 2] or at_y > boxes[0, 3]:
-        return -1
-    set_edges(polygon, edges, boxes, depths, snapped)
-    triangle = covering_triangle(edges, at_x, at_y)
-    if triangle < 0:
-        return -1
-    return keep_nearest(samples, x, y, s, depth_at(edges, depths, triangle, at_x, at_y), p)
-
-
-@kernel
 def set_up_at(start: Any, end: Any, blur: Any, p: int, time_lens: Any, polygon: Any, setup: Any) -> None:
     """Place a polygon and set it up."""
     put(start, end, blur, p, time_lens[0], time_lens[1], time_lens[2], polygon)

@@ -13,18 +13,19 @@ import numpy as np
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, pixel_box
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, in_box, new_setup, set_edges, snap
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, pixel_box, units_of
 from tilestamp.simulator.stages.fatahalian2009.motion import (
+    STEPS,
     BlurPattern,
     MotionEvent,
     MovingMicropolygons,
     begin_warp,
-    end_test,
+    count_atomic,
+    hit_sample,
     motion_table,
     motion_work,
-    set_up_at,
-    test_sample,
+    put,
 )
 
 
@@ -34,61 +35,82 @@ def motion_interleaved(
     """Draw moving polygons by interleaving; a row of work for each warp of polygons."""
     simt = Simt(*map(int, simt))
     table = motion_table(polygons, simt)
-    _motion_interleaved(polygons.start, polygons.end, polygons.blur, pattern, samples, simt, table)
+    draw_in_parts(_motion_interleaved, len(table), samples, *polygons, pattern, simt, table)
     return StageResult(samples, (motion_work("interleaved", table, polygons, samples, simt),))
 
 
 @kernel
 def _motion_interleaved(
-    start: Any, end: Any, blur: Any, pattern: BlurPattern, samples: Samples, simt: Simt, table: Any
-) -> None:
-    edges, boxes = np.zeros((simt.warp, 6, 4), np.int64), np.zeros((simt.warp, 3, 4), np.int64)
-    depths, snapped = np.zeros((simt.warp, 2, 3)), np.zeros((4, 2), np.int64)
-    polygon = np.empty(start.shape[1:], np.float32)
-    walk = np.empty((simt.warp, 4), np.int64)  # of a lane: first x and y, pixels in a row, pixels
+    part: int, parts: int, samples: Samples, start: Any, end: Any, blur: Any, pattern: BlurPattern, simt: Simt,
+    table: Any,
+) -> None:  # fmt: skip
+    """Draw a share of the warps."""
+    scratch = new_setup(), np.empty(start.shape[1:], np.float32)
+    steps = np.zeros(STEPS, np.int64), np.empty((STEPS, simt.warp), np.int64)  # hits, and their addresses
+    _draw_warps(units_of(part, parts, len(table)), start, end, blur, pattern, samples, simt, scratch, steps, table)
+
+
+@kernel(lent=True)
+def _draw_warps(
+    units: Any, start: Any, end: Any, blur: Any, pattern: BlurPattern, samples: Samples, simt: Simt, scratch: Any,
+    steps: Any, table: Any,
+) -> None:  # fmt: skip
     tile, _, spp, _ = pattern.place.shape
-    for unit in range(len(table)):
+    for unit in units:
         row, first = table[unit], unit * simt.warp
         last = min(first + simt.warp, len(start))
         begin_warp(first, last, start.shape[1], simt, row)
+        row[MotionEvent.BOX_WARPS] += tile * tile * spp
+        row[MotionEvent.BOXES] += tile * tile * spp * (last - first)
         for i in range(tile):
             for j in range(tile):
                 for s in range(spp):
-                    row[MotionEvent.BOX_WARPS] += 1
-                    row[MotionEvent.BOXES] += last - first
-                    for p in range(first, last):
-                        setup = (edges[p - first], boxes[p - first], depths[p - first], snapped)
-                        set_up_at(start, end, blur, p, pattern.time_lens[i, j, s], polygon, setup)
-                        _own_pixels(setup[1], samples, tile, i, j, walk[p - first])
-                    _walk(first, last, (edges, boxes, depths, snapped), walk, pattern, samples, simt, row, i, j, s)
+                    begin, more = 0, True
+                    while more:
+                        most = 0
+                        for p in range(first, last):
+                            left = _walk(start, end, blur, p, pattern, samples, i, j, s, begin, scratch, steps)
+                            row[MotionEvent.SAMPLE_TESTS] += min(left, STEPS)
+                            most = max(most, left)
+                        row[MotionEvent.TEST_WARPS] += min(most, STEPS)
+                        for step in range(min(most, STEPS)):
+                            count_atomic(samples, steps[1][step], steps[0][step], simt, row)
+                            steps[0][step] = 0
+                        begin, more = begin + STEPS, most > STEPS
 
 
-@kernel
-def _own_pixels(boxes: Any, samples: Samples, tile: int, i: int, j: int, walk: Any) -> None:
-    """Pixels of a polygon's box whose place in their tile is row i, column j."""
-    x0, y0, x1, y1 = pixel_box(boxes, samples.width, samples.height)
-    walk[0], walk[1] = x0 + (j - x0) % tile, y0 + (i - y0) % tile
-    walk[2] = max((x1 - walk[0]) // tile + 1, 0)
-    walk[3] = walk[2] * max((y1 - walk[1]) // tile + 1, 0)
-
-
-@kernel
+@kernel(lent=True)
 def _walk(
-    first: int, last: int, setups: Any, walk: Any, pattern: BlurPattern, samples: Samples, simt: Simt, row: Any,
-    i: int, j: int, s: int,
-) -> None:  # fmt: skip
-    """Lanes step through their pixels together, each testing its one sample of a tile."""
-    addresses = np.empty(simt.warp, np.int64)
-    tile = pattern.place.shape[0]
-    for step in range(walk[: last - first, 3].max()):
-        active, hits = 0, 0
-        for lane in range(last - first):
-            if step >= walk[lane, 3]:
-                continue
-            active += 1
-            x, y = walk[lane, 0] + step % walk[lane, 2] * tile, walk[lane, 1] + step // walk[lane, 2] * tile
-            at_x, at_y = x * STEP + pattern.place[i, j, s, 0], y * STEP + pattern.place[i, j, s, 1]
-            setup = (setups[0][lane], setups[1][lane], setups[2][lane], setups[3])
-            addresses[hits] = test_sample(first + lane, setup, samples, x, y, s, at_x, at_y)
-            hits += addresses[hits] >= 0
-        end_test(samples, active, addresses, hits, simt, row)
+    start: Any, end: Any, blur: Any, p: int, pattern: BlurPattern, samples: Samples, i: int, j: int, s: int, begin: int,
+    scratch: Any, steps: Any,
+) -> int:  # fmt: skip
+    """Place a polygon, and test its one sample of each tile from step ``begin`` on; returns the steps left from there.
+
+    Where it hits stands in ``steps``.
+    """
+    (edges, boxes, depths, snapped), polygon = scratch
+    hits, addresses = steps
+    tile, time_lens = pattern.place.shape[0], pattern.time_lens
+    put(start, end, blur, p, time_lens[i, j, s, 0], time_lens[i, j, s, 1], time_lens[i, j, s, 2], polygon)
+    snap(polygon, boxes, snapped)
+    x0, y0, x1, y1 = pixel_box(boxes, samples.width, samples.height)
+    x0, y0 = x0 + (j - x0) % tile, y0 + (i - y0) % tile
+    if x1 < x0 or y1 < y0:
+        return 0
+    wide = (x1 - x0) // tile + 1
+    left = wide * ((y1 - y0) // tile + 1) - begin
+    x, y = x0 + begin % wide * tile, y0 + begin // wide * tile
+    ready = False
+    for step in range(min(left, STEPS)):
+        samples.tests[y, x] += 1
+        at_x, at_y = x * STEP + pattern.place[i, j, s, 0], y * STEP + pattern.place[i, j, s, 1]
+        if in_box(boxes, at_x, at_y):
+            if not ready:
+                set_edges(polygon, edges, boxes, depths, snapped)
+                ready = True
+            addresses[step, hits[step]] = hit_sample(p, scratch[0], samples, x, y, s, at_x, at_y)
+            hits[step] += addresses[step, hits[step]] >= 0
+        x += tile
+        if x > x1:
+            x, y = x0, y + tile
+    return int(max(left, 0))

@@ -16,9 +16,10 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, new_setup
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, in_box, new_setup, set_edges, snap
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, units_of
 from tilestamp.simulator.stages.fatahalian2009.motion import (
+    STEPS,
     BlurPattern,
     MotionEvent,
     MovingMicropolygons,
@@ -33,7 +34,6 @@ from tilestamp.simulator.stages.fatahalian2009.motion import (
 EVERYTHING = (0.0, 1.0, -1.0, 1.0, -1.0, 1.0)  # time, lens u, lens v
 MARGIN = 1.0 / 64.0  # pixels: covers the rounding of placed vertices to float32
 ENTRY_BYTES = 16  # of the table of samples: time, u and v, and the place in the pixel in 16 bits each
-STEPS = 64  # that a lane walks ahead before the others do
 
 
 def intervals_of(pattern: BlurPattern, count: int | None = None) -> NDArray[np.float64]:
@@ -187,10 +187,11 @@ def _walk(
         at_x, at_y = x * STEP + pattern.place[i, j, s, 0], y * STEP + pattern.place[i, j, s, 1]
         if not (_beyond(at_x / STEP, time, u, reach, 0) or _beyond(at_y / STEP, time, v, reach, 2)):
             put(start, end, blur, p, time, u, v, polygon)
-            address = hit_sample(p, polygon, setup, samples, x, y, s, at_x, at_y)
-            if address >= 0:
-                addresses[step, hits[step]] = address
-                hits[step] += 1
+            snap(polygon, setup[1], setup[3])
+            if in_box(setup[1], at_x, at_y):
+                set_edges(polygon, setup[0], setup[1], setup[2], setup[3])
+                addresses[step, hits[step]] = hit_sample(p, setup, samples, x, y, s, at_x, at_y)
+                hits[step] += addresses[step, hits[step]] >= 0
         s += 1
         if s == high:
             s, x, j = low, x + 1, j + 1 if j + 1 < tile else 0

@@ -14,6 +14,7 @@ from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
+    in_box,
     new_setup,
     set_edges,
     snap,
@@ -21,7 +22,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import pixel_box
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
-from tilestamp.simulator.stages.fatahalian2009.stamps import StampShape
+from tilestamp.simulator.stages.fatahalian2009.stamps_events import StampShape
 
 SMALLEST_PART = 1024  # polygons
 
@@ -86,7 +87,7 @@ def _count(
             for x in range(x0, x1 + 1):
                 for s in range(len(offsets)):
                     at_x, at_y = x * STEP + offsets[s, 0], y * STEP + offsets[s, 1]
-                    if at_x < boxes[0, 0] or at_y < boxes[0, 1] or at_x > boxes[0, 2] or at_y > boxes[0, 3]:
+                    if not in_box(boxes, at_x, at_y):
                         continue
                     if not ready:
                         set_edges(vertices[p], edges, boxes, depths, snapped)
