@@ -71,7 +71,7 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     count = 0
     total = 0
     for first in range(0, lanes, max(1, request)):
-        n, b = _segments(addresses, first, min(first + request, lanes), segment, shrink)
+        n, b = _segments(addresses, first, min(first + request, lanes), access_bytes, segment, shrink)
         count += n
         total += b
     return count, total
@@ -120,12 +120,14 @@ def _lanes_of_a_line(access_bytes: int) -> int:
 @kernel(lent=True)
 def touched_lines(addresses: Any, lanes: int) -> int:
     """Distinct lines of 128 bytes of one memory instruction; parameters as of ``transactions``."""
-    count: int = _segments(addresses, 0, lanes, SEGMENT_BYTES, False)[0]
+    count: int = _segments(addresses, 0, lanes, WORD_BYTES, SEGMENT_BYTES, False)[0]
     return count
 
 
 @kernel(lent=True)
-def _segments(addresses: Any, first: int, end: int, segment_bytes: int, shrink: bool) -> tuple[int, int]:
+def _segments(
+    addresses: Any, first: int, end: int, access_bytes: int, segment_bytes: int, shrink: bool
+) -> tuple[int, int]:
     """Distinct segments of the lanes first..end-1 and their bytes; ``shrink`` halves a segment that is half unused."""
     count = 0
     total = 0
@@ -135,17 +137,19 @@ def _segments(addresses: Any, first: int, end: int, segment_bytes: int, shrink: 
         together = lanes_near(addresses, first, end, here, segment_bytes)
         waiting &= ~together
         count += 1
-        total += _used(addresses, first, end, together, here, segment_bytes) if shrink else segment_bytes
+        total += _used(addresses, first, together, access_bytes, segment_bytes) if shrink else segment_bytes
     return count, total
 
 
 @kernel(lent=True)
-def _used(addresses: Any, first: int, end: int, together: Any, here: int, segment_bytes: int) -> int:
-    """Bytes of the smallest part of a segment that holds what some lanes of it access, ``here`` among them."""
-    size = SECTOR_BYTES
-    while size < segment_bytes and together & ~lanes_near(addresses, first, end, here, size) != np.uint64(0):
-        size *= 2
-    return size
+def _used(addresses: Any, first: int, together: Any, access_bytes: int, segment_bytes: int) -> int:
+    """Bytes of the smallest part of a segment that holds what some lanes of it access."""
+    low = high = addresses[first + lowest_bit(together)]
+    while together != np.uint64(0):
+        here = addresses[first + lowest_bit(together)]
+        together &= together - np.uint64(1)
+        low, high = min(low, here), max(high, here)
+    return int(_shrunk(low, high + access_bytes, segment_bytes))
 
 
 @kernel(lent=True)
