@@ -19,6 +19,7 @@ FOREIGN = {  # what they take belongs to a library without types
     "models/kernel.py": "numba",
     "models/kernel_cache.py": "numba",
     "models/kernel_library.py": "numba",
+    "models/compile_quicker.py": "numba",
     "models/kernel_digest.py": "numba",
     "models/bits.py": "numba",
     "simulator/stages/borrow.py": "numba",

@@ -174,9 +174,9 @@ def _to_screen(point: Any, matrix: Any, width: int, height: int, screen: Any) ->
 
 
 @kernel(lent=True, inline=True)
-def _row(point: Any, row: Any) -> Any:
+def _row(point: Any, of: Any) -> Any:
     """One row of a matrix times a point, as BLAS rounds it."""
-    return fma64(point[3], row[3], fma64(point[2], row[2], fma64(point[1], row[1], point[0] * row[0])))
+    return fma64(point[3], of[3], fma64(point[2], of[2], fma64(point[1], of[1], point[0] * of[0])))
 
 
 @kernel(lent=True, error_model="numpy")

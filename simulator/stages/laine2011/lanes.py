@@ -116,11 +116,11 @@ def write_reversed(values: Any, at: Any, target: Any, i: Any) -> None:
     target[i : i + LANES] = values[at : at + LANES][::-1]
 
 
-def _ramp(builder: Any, first: Any, step: Any, row: Any) -> Any:
+def _ramp(builder: Any, first: Any, step: Any, vector: Any) -> Any:
     from llvmlite import ir
 
-    steps = builder.mul(spread(builder, step, row), ir.Constant(row, list(range(LANES))))
-    return builder.add(spread(builder, first, row), steps)
+    steps = builder.mul(spread(builder, step, vector), ir.Constant(vector, list(range(LANES))))
+    return builder.add(spread(builder, first, vector), steps)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
