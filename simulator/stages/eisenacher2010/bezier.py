@@ -48,10 +48,16 @@ def set_square(squares: Squares, lane: Any, queue: Any, n: Any) -> None:
 
 
 @kernel(lent=True)
-def gather(points: Any, patch: Any, net: Any) -> None:
-    """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES)."""
+def gather(points: Any, patch: Any, gathered: Any, net: Any) -> None:
+    """Lay the control points (P, >= D, 16) of the patches of all lanes side by side: ``net`` (D, 16, LANES).
+
+    Lanes keep those of the patch that they have ``gathered``: neighbours in the queue come from one patch.
+    """
     for lane in range(LANES):
         p = patch[lane]
+        if gathered[lane] == p:
+            continue
+        gathered[lane] = p
         for d in range(net.shape[0] // (POINTS * LANES)):
             for k in range(POINTS):
                 net[(POINTS * d + k) * LANES + lane] = points[p, d, k]

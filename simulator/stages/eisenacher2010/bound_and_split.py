@@ -41,7 +41,6 @@ MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 
 MAX_QUEUE = 2**24  # sub-patches
 
 BoundRule = Literal["control_points", "pixel_extent"]
-_SLOTS = np.array([0, 1, 0, 4, 4], np.uint32)  # wanted in the next queue, by path
 
 
 class SubPatches(NamedTuple):
@@ -140,9 +139,10 @@ def bound_and_split(
             examine, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels,
             min_depth, max_depth,
         )  # fmt: skip
-        slots = _SLOTS[path]
+        slots = (path == KEEP).astype(np.uint32)
+        slots += np.uint32(4) * (path >= ACROSS)
         places, scan, _ = bucket_scan(slots, simt, counting=counting)
-        culled, kept, given_up, across, split = (int(n) for n in np.bincount(path, minlength=len(Path)))
+        culled, kept, given_up, across, split = (int(np.count_nonzero(path == way)) for way in Path)
         passes.append([len(path), culled, kept, across + split, given_up])
         if counting:
             works += [oracle_work(queue.patch, path, simt), *scan_works(scan)]
@@ -150,7 +150,7 @@ def bound_and_split(
             break
         if counting:
             works.append(subdivide_work(path, places, simt))
-        queue, path = _next_queue(queue, path, places, int(slots.sum()), bound)
+        queue, path = _next_queue(queue, path, places, kept + 4 * (across + split), bound)
         if across + split == 0:
             break
     return StageResult(SubPatches(*queue[:4], np.array(passes, np.int64)), tuple(works))

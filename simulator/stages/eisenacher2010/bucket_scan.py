@@ -64,10 +64,10 @@ def bucket_scan(count: NDArray[np.uint32], simt: Simt, *, counting: bool = True)
     TilestampError
         More patches in tiles than 32 bits count.
     """
-    ends = np.cumsum(count, dtype=np.int64)
-    if len(ends) and ends[-1] > _LARGEST:
-        raise TilestampError(f"{ends[-1]} patches in tiles are more than 32-bit lists hold: draw a smaller image")
-    start = (ends - count).astype(np.uint32)
+    total = int(count.sum(dtype=np.int64))
+    if total > _LARGEST:
+        raise TilestampError(f"{total} patches in tiles are more than 32-bit lists hold: draw a smaller image")
+    start = np.cumsum(count, dtype=np.uint32) - count
     if not counting:
         return StageResult(start)
     sizes = [len(count)]

@@ -35,13 +35,13 @@ from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import BLOCK, VERTICES, dice_work
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide, joined, squares
 from tilestamp.simulator.stages.eisenacher2010.shading import (
+    COLOR,
     MATT,
     NORMAL,
     NUDGE,
     Grid,
     lighting,
     new_grid,
-    packed_color,
     set_normals,
     shade,
     tangent,
@@ -81,20 +81,30 @@ def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int, values: 
 
 
 @kernel(lent=True)
-def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, colors: Any, boxes: Any) -> None:
-    """Write the vertices of each lane, and bound them."""
-    screen = grid.screen
+def _set_boxes(s: Any, box: Any) -> None:
+    """Bound the vertices of all lanes."""
+    for n in range(box.shape[0] // 4):
+        x0 = x1 = s[n]
+        y0 = y1 = s[shading.VERTICES + n]
+        for k in range(LANES, shading.VERTICES, LANES):
+            x, y = s[k + n], s[shading.VERTICES + k + n]
+            x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
+        box[n], box[LANES + n], box[2 * LANES + n], box[3 * LANES + n] = x0, y0, x1, y1
+
+
+@kernel(lent=True)
+def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, boxes: Any) -> None:
+    """Write the vertices of each lane, and their box."""
+    _set_boxes(grid.rows, grid.box)
     for n in range(lanes):
-        x0 = y0 = np.float32(np.inf)
-        x1 = y1 = np.float32(-np.inf)
+        s, box = grid.rows[n:], grid.box[n:]
         for k in range(VERTICES):
-            x, y = screen[k * LANES + n], screen[shading.VERTICES + k * LANES + n]
-            z = screen[3 * shading.VERTICES + k * LANES + n]
-            vertices[first + n, k, 0], vertices[first + n, k, 1], vertices[first + n, k, 2] = x, y, z
-            colors[first + n, k, 3] = packed_color(grid.rows, k * LANES + n)
-            x0, x1 = min(x0, x), max(x1, x)
-            y0, y1 = min(y0, y), max(y1, y)
-        boxes[first + n, 0], boxes[first + n, 1], boxes[first + n, 2], boxes[first + n, 3] = x0, y0, x1, y1
+            vertices[first + n, k, 0] = s[k * LANES]
+            vertices[first + n, k, 1] = s[shading.VERTICES + k * LANES]
+            vertices[first + n, k, 2] = s[3 * shading.VERTICES + k * LANES]
+            vertices[first + n, k, 3] = s[COLOR + k * LANES]
+        for k in range(4):
+            boxes[first + n, k] = box[k * LANES]
 
 
 @kernel(error_model="numpy", lent=True)
@@ -120,12 +130,12 @@ def _dice(
     texture: Any,
     shaded: Any,
     vertices: Any,
-    colors: Any,
     boxes: Any,
 ) -> None:
     """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
     grid, squares = new_grid(side, width), new_squares(width)
     corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)
+    gathered = np.full((2, width), -1, np.int32)
     values = np.zeros((6, 4), np.float32)
     number = boxes.shape[0]
     batches = (number + LANES - 1) // LANES
@@ -135,11 +145,11 @@ def _dice(
             set_square(squares, n, subpatches, first + min(n, lanes - 1))
         basis(squares.i, squares.side, grid.by_u, grid.slope_u)
         basis(squares.j, squares.side, grid.by_v, grid.slope_v)
-        gather(screen, squares.patch, corners)
+        gather(screen, squares.patch, gathered[0], corners)
         restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
         _project(grid.rows)
         if shaded:
-            gather(nets, squares.patch, net)
+            gather(nets, squares.patch, gathered[1], net)
             evaluate(
                 net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u,
                 grid.along_v,
@@ -147,7 +157,7 @@ def _dice(
             if set_normals(grid.rows):
                 _borrow_normals(grid, net, squares, lanes, values)
             shade(grid, light, texture, squares)
-        _store_grids(grid, first, lanes, vertices, colors, boxes)
+        _store_grids(grid, first, lanes, vertices, boxes)
 
 
 def dice(
@@ -212,7 +222,6 @@ def dice(
     vertices = np.empty((number, VERTICES, 4), np.float32)
     grids = Grids(vertices, np.empty((number, 4), np.float32))
     light = lighting(points, matrix)
-    colors = vertices.view(np.uint32)
     for_parts(
         _dice,
         parts_of(number, BLOCK),
@@ -225,7 +234,6 @@ def dice(
         texture,
         shaded,
         vertices,
-        colors,
         grids.boxes,
     )
     return StageResult(grids, works)

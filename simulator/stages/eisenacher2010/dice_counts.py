@@ -80,18 +80,22 @@ def _points(patch: NDArray[np.int32], per_block: int, simt: Simt) -> NDArray[np.
     queue come from one urPatch. So a warp touches the segments of as many urPatches as it has different ones.
     """
     together = max(1, simt.warp // VERTICES)
-    blocks, width = -(-len(patch) // per_block), -(-per_block // together) * together
-    padded = np.full((blocks, width), -1, np.int64)
-    block, place = np.divmod(np.arange(len(patch)), per_block)
-    padded[block, place] = patch
-    warps = np.sort(padded.reshape(-1, together), axis=1)
-    different = (np.diff(warps, axis=1, prepend=-1) > 0).sum(axis=1)
-    cost = np.zeros((together + 1, together + 1, 2), np.int64)
-    for grids in range(1, together + 1):
-        for patches in range(1, grids + 1):
-            cost[grids, patches] = _warp_points(np.minimum(np.arange(grids), patches - 1), simt)
-    by_warp = cost[(warps >= 0).sum(axis=1), different].reshape(blocks, width // together, 2)
-    loads: NDArray[np.int64] = by_warp.sum(axis=1)
+    blocks, warps = -(-len(patch) // per_block), -(-per_block // together)
+    padded = np.full((blocks, warps * together), -1, np.int32)
+    whole = len(patch) // per_block
+    padded[:whole, :per_block] = patch[: whole * per_block].reshape(whole, per_block)
+    padded[whole:, : len(patch) % per_block] = patch[whole * per_block :]
+    lanes = [padded[:, lane::together] for lane in range(together)]  # a grid of each warp, (blocks, warps)
+    loads = np.zeros((blocks, 2), np.int64)
+    grids = sum((lane >= 0).astype(np.int8) for lane in lanes)
+    different = sum(
+        ((lane >= 0) & np.logical_and.reduce([lane != other for other in lanes[:k]])).astype(np.int8)
+        for k, lane in enumerate(lanes)
+    )
+    for number in range(1, together + 1):
+        for patches in range(1, number + 1):
+            cost = _warp_points(np.minimum(np.arange(number), patches - 1), simt)
+            loads += np.multiply.outer(np.count_nonzero((grids == number) & (different == patches), axis=1), cost)
     return loads
 
 

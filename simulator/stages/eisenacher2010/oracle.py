@@ -44,6 +44,7 @@ class _Scratch(NamedTuple):
     by_u: NDArray[np.float32]  # (4, 4, LANES)
     by_v: NDArray[np.float32]
     between: NDArray[np.float32]  # (4, 4, LANES)
+    gathered: NDArray[np.int32]  # (LANES,) patch whose points are in ``patch_net``
     patch_net: NDArray[np.float32]  # (3, 16, LANES) x w, y w in pixels, and w
     net: NDArray[np.float32]  # (3, 16, LANES)
     everywhere: NDArray[np.int32]  # (LANES,) sides of the frustum that all points lie outside of
@@ -62,6 +63,7 @@ def _new_scratch(side: Any, lanes: Any) -> Any:
         np.empty(4 * side * lanes, np.float32),
         np.empty(4 * side * lanes, np.float32),
         np.empty(side * side * lanes, np.float32),
+        np.full(lanes, -1, np.int32),
         np.empty(3 * POINTS * lanes, np.float32),
         np.empty(3 * POINTS * lanes, np.float32),
         np.empty(lanes, np.int32),
@@ -143,7 +145,7 @@ def examine(
             k += 1
         restriction(squares.i, squares.side, s.by_u)
         restriction(squares.j, squares.side, s.by_v)
-        gather(screen, squares.patch, s.patch_net)
+        gather(screen, squares.patch, s.gathered, s.patch_net)
         restrict(s.patch_net, s.by_u, s.by_v, s.between, s.net)
         _measure(s, size[0], size[1], size[2])
         for n in range(lanes):

@@ -38,7 +38,7 @@ class Lighting(NamedTuple):
 VERTICES = 16 * LANES  # vertex k of lane n is k * LANES + n
 SCREEN, POINT, ALONG_U, ALONG_V, NORMAL = (4 * VERTICES * row for row in range(5))  # 4 coordinates each, 3 of NORMAL
 MATT, GLOSS = 19 * VERTICES, 20 * VERTICES  # ambient and diffuse, and specular light
-COLOR = 21 * VERTICES  # red, green, blue
+COLOR = 21 * VERTICES  # red, green, blue reflectance; then the packed colour's bits in the first
 ROWS = 24 * VERTICES
 
 
@@ -51,6 +51,8 @@ class Grid(NamedTuple):
     slope_v: NDArray[np.float32]
     between: NDArray[np.float32]  # (4, 4, LANES)
     rows: NDArray[np.float32]  # (ROWS,)
+    words: NDArray[np.uint32]  # (ROWS,) its bits
+    box: NDArray[np.float32]  # (4, LANES) x0, y0, x1, y1
     screen: NDArray[np.float32]  # (4, 16, LANES) x w, y w, w, z w
     point: NDArray[np.float32]  # (4, 16, LANES) homogeneous, model space
     along_u: NDArray[np.float32]  # (4, 16, LANES)
@@ -62,6 +64,7 @@ def new_grid(side: Any, lanes: Any) -> Any:
     """Scratch for grids; w = 1 until a patch with weights writes it."""
     rows = np.zeros(ROWS, np.float32)
     rows[POINT + 3 * VERTICES : POINT + 4 * VERTICES] = 1
+    rows.view(np.uint32)[COLOR : COLOR + VERTICES] = OPAQUE
     return Grid(
         np.zeros(4 * side * lanes, np.float32),
         np.zeros(4 * side * lanes, np.float32),
@@ -69,6 +72,8 @@ def new_grid(side: Any, lanes: Any) -> Any:
         np.zeros(3 * side * lanes, np.float32),
         np.zeros(side * side * lanes, np.float32),
         rows,
+        rows.view(np.uint32),
+        np.zeros(4 * lanes, np.float32),
         rows[SCREEN : SCREEN + 4 * VERTICES],
         rows[POINT : POINT + 4 * VERTICES],
         rows[ALONG_U : ALONG_U + 4 * VERTICES],
@@ -96,8 +101,7 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
     towards = -w[:3] if np.any(w[:3]) else eye[:3]
     axes = [axis / np.linalg.norm(axis) for axis in (x[:3], y[:3], towards)]
     lamp = sum(part * axis for part, axis in zip(LAMP, axes, strict=True))
-    corners = points[..., :3] / points[..., 3:]
-    extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) or 1.0
+    extent = float(max(np.ptp(points[..., d] / points[..., 3]) for d in range(3))) or 1.0
     return Lighting(
         (lamp / np.linalg.norm(lamp)).astype(np.float32), eye.astype(np.float32), np.float32(CHECKERS / extent)
     )
@@ -106,7 +110,7 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
 @kernel(error_model="numpy", lent=True)
 def set_normals(s: Any) -> Any:
     """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
-    missing = 0
+    missing = np.int32(0)
     for k in range(VERTICES):
         px, py, pz, w = s[POINT + k], s[POINT + VERTICES + k], s[POINT + 2 * VERTICES + k], s[POINT + 3 * VERTICES + k]
         wu, wv = s[ALONG_U + 3 * VERTICES + k], s[ALONG_V + 3 * VERTICES + k]
@@ -123,7 +127,7 @@ def set_normals(s: Any) -> Any:
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         most = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
         none = nx * nx + ny * ny + nz * nz <= DEGENERATE * most
-        missing += none
+        missing = np.int32(missing + none)
         s[NORMAL + k], s[NORMAL + VERTICES + k], s[NORMAL + 2 * VERTICES + k] = nx, ny, nz
         s[MATT + k] = _ZERO if none else _ONE  # until the light is set: whether there is a normal
     return missing
@@ -195,29 +199,28 @@ def _set_texels(s: Any, texture: Any, squares: Any) -> None:
             s[COLOR + VERTICES * channel + at] = np.float32(texture[row, column, channel]) / _BYTE
 
 
-@kernel(error_model="numpy", lent=True)
-def _set_colors(s: Any) -> None:
-    """Light the reflectances: levels from 0 to 255."""
-    for channel in range(3):
-        for k in range(VERTICES):
-            level = s[COLOR + channel * VERTICES + k] * s[MATT + k] + s[GLOSS + k]
-            s[COLOR + channel * VERTICES + k] = min(level, _ONE) * _BYTE + _HALF
+@kernel(lent=True)
+def _level(s: Any, channel: int, k: int) -> Any:
+    """Light a reflectance: from 0 to 255."""
+    level = s[COLOR + channel * VERTICES + k] * s[MATT + k] + s[GLOSS + k]
+    return np.uint32(min(level, _ONE) * _BYTE + _HALF)
+
+
+@kernel(lent=True)
+def _set_colors(s: Any, words: Any) -> None:
+    """Light the reflectances, and pack them in the place of the first: RGBA8, red lowest."""
+    for k in range(VERTICES):
+        red, green, blue = _level(s, 0, k), _level(s, 1, k), _level(s, 2, k)
+        words[COLOR + k] = red | green << np.uint32(8) | blue << np.uint32(16) | OPAQUE
 
 
 @kernel(lent=True)
 def shade(grid: Grid, light: Lighting, texture: Any, squares: Any) -> None:
-    """Set the colours of grids with normals: three rows of levels, to be cut to whole numbers."""
+    """Set the colours of grids with normals."""
     s, lamp, eye = grid.rows, light.lamp, light.eye
     _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])
     if texture is None:
         _set_checker(s, light.squares)
     else:
         _set_texels(s, texture, squares)
-    _set_colors(s)
-
-
-@kernel(lent=True)
-def packed_color(s: Any, k: Any) -> Any:
-    """RGBA8 of a shaded vertex, red lowest."""
-    red, green, blue = s[COLOR + k], s[COLOR + VERTICES + k], s[COLOR + 2 * VERTICES + k]
-    return np.uint32(red) | np.uint32(green) << np.uint32(8) | np.uint32(blue) << np.uint32(16) | OPAQUE
+    _set_colors(s, grid.words)

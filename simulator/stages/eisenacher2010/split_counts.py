@@ -81,17 +81,20 @@ _T = TransformEvent
 
 @kernel(lent=True)
 def _count_oracle_warp(
-    first: Any, lanes: int, patch: Any, path: Any, coalescing: Any, addresses: Any, row: Any
+    first: Any, lanes: int, patch: Any, path: Any, entries: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:
-    """Events of one warp of the oracle."""
-    boxes = 0
+    """Events of one warp of the oracle, which loads its ``entries`` of the queue."""
+    boxes = kept = split = given_up = 0
     for lane in range(lanes):
         found = path[first + lane]
-        boxes += found == _KEEP or found > _ACROSS
-        row[_O.KEPT] += found == _KEEP
-        row[_O.SPLIT] += found >= _ACROSS
-        row[_O.GIVEN_UP] += found == _GIVE_UP
-        row[_O.CULLED] += found == 0
+        boxes += (found == _KEEP) | (found > _ACROSS)
+        kept += found == _KEEP
+        split += found >= _ACROSS
+        given_up += found == _GIVE_UP
+    row[_O.KEPT] += kept
+    row[_O.SPLIT] += split
+    row[_O.GIVEN_UP] += given_up
+    row[_O.CULLED] += lanes - kept - split - given_up
     row[_O.EXAMINE_WARPS] += 1
     row[_O.EXAMINE_LANES] += lanes
     row[_O.BOX_WARPS] += boxes > 0
@@ -100,13 +103,8 @@ def _count_oracle_warp(
     for lane in range(lanes):
         addresses[lane] = np.int64(patch[first + lane]) * (POINTS * POINT_BYTES)
     count, size = transactions(addresses, lanes, POINT_BYTES, coalescing)
-    row[_O.LOAD_TRANSACTIONS] += POINTS * count  # the 16 loads differ by less than a patch's segment
-    row[_O.LOAD_BYTES] += POINTS * size
-    for lane in range(lanes):
-        addresses[lane] = (first + lane) * ENTRY_BYTES
-    count, size = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
-    row[_O.LOAD_TRANSACTIONS] += count
-    row[_O.LOAD_BYTES] += size
+    row[_O.LOAD_TRANSACTIONS] += POINTS * count + entries[0]  # 16 loads differ by less than a patch's segment
+    row[_O.LOAD_BYTES] += POINTS * size + entries[1]
     count, size = contiguous(first * WORD_BYTES, lanes * WORD_BYTES, coalescing)
     row[_O.STORE_TRANSACTIONS] += count
     row[_O.STORE_BYTES] += size
@@ -114,14 +112,13 @@ def _count_oracle_warp(
 
 @kernel(lent=True)
 def _count_subdivide_warp(
-    first: Any, lanes: int, path: Any, places: Any, coalescing: Any, addresses: Any, row: Any
+    first: Any, lanes: int, path: Any, places: Any, entries: Any, coalescing: Any, addresses: Any, row: Any
 ) -> None:
     """Events of one warp of the subdivision: one store of what is kept, then four of children."""
     kept = split = 0
     for lane in range(lanes):
         kept += path[first + lane] == _KEEP
         split += path[first + lane] >= _ACROSS
-        addresses[lane] = (first + lane) * ENTRY_BYTES
     row[_S.MOVE_WARPS] += 1
     row[_S.MOVE_LANES] += lanes
     row[_S.KEEP_WARPS] += kept > 0
@@ -129,10 +126,9 @@ def _count_subdivide_warp(
     row[_S.SPLIT_WARPS] += split > 0
     row[_S.SPLIT_LANES] += split
     row[_S.DIVERGENT_WARPS] += 0 < kept < lanes or 0 < split < lanes
-    entries, entry_bytes = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
     words, word_bytes = contiguous(first * WORD_BYTES, lanes * WORD_BYTES, coalescing)
-    row[_S.LOAD_TRANSACTIONS] += entries + 2 * words
-    row[_S.LOAD_BYTES] += entry_bytes + 2 * word_bytes
+    row[_S.LOAD_TRANSACTIONS] += entries[0] + 2 * words
+    row[_S.LOAD_BYTES] += entries[1] + 2 * word_bytes
     for store in range(5):
         if (kept if store == 0 else split) == 0:
             continue
@@ -146,20 +142,32 @@ def _count_subdivide_warp(
         row[_S.STORE_BYTES] += size
 
 
+@kernel(lent=True)
+def _entries(lanes: int, coalescing: Any, addresses: Any) -> tuple[int, int]:
+    """Transactions and bytes of a warp's load of its queue entries: warps are aligned alike."""
+    for lane in range(lanes):
+        addresses[lane] = lane * ENTRY_BYTES
+    count, size = transactions(addresses, lanes, ENTRY_BYTES, coalescing)
+    return count, size
+
+
 @kernel
 def _count_blocks(
     part: int, parts: int, patch: Any, path: Any, places: Any, warp: int, coalescing: Any, table: Any
 ) -> None:
     """Events of the blocks of one part; of the subdivision where ``places`` are given."""
     addresses = np.empty(warp, np.int64)
+    entries = _entries(warp, coalescing, addresses)
     for block in range(part * table.shape[0] // parts, (part + 1) * table.shape[0] // parts):
         end = min((block + 1) * BLOCK, path.shape[0])
         for first in range(block * BLOCK, end, warp):
             lanes = min(warp, end - first)
+            if lanes < warp:
+                entries = _entries(lanes, coalescing, addresses)
             if places is None:
-                _count_oracle_warp(first, lanes, patch, path, coalescing, addresses, table[block])
+                _count_oracle_warp(first, lanes, patch, path, entries, coalescing, addresses, table[block])
             else:
-                _count_subdivide_warp(first, lanes, path, places, coalescing, addresses, table[block])
+                _count_subdivide_warp(first, lanes, path, places, entries, coalescing, addresses, table[block])
 
 
 def _blocks(threads: int) -> int:
