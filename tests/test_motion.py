@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numba import get_num_threads, set_num_threads
 
 from tests import naive_motion, naive_ste
 from tests.test_counts_of_warps import HOPPER, by_machine, nonzero
@@ -21,6 +22,7 @@ from tilestamp.simulator.stages.fatahalian2009.motion import (
 )
 from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import motion_brute_force, motion_interval
+from tilestamp.simulator.stages.fatahalian2009.stamps import stamp_shape, stamps
 from tilestamp.simulator.stages.fatahalian2009.thin_lens import circle_of_confusion, defocus, eye_distances
 
 PATTERNS = {"stratified": stratified_pattern(4, tile=3), "interleaved": interleaved_pattern(2, tile=2)}
@@ -102,6 +104,40 @@ def test_hits_do_not_depend_on_how_they_are_found():
         for a in (motion_brute_force, motion_interval, motion_interleaved)
     }
     assert len(hits) == 1
+
+
+def squares(count):
+    """Squares of a pixel here and there, again and again, which move and are blurred alike."""
+    rng = np.random.default_rng(5)
+    at = rng.random((count // 4, 1, 3)) * [WIDTH, HEIGHT, 1]
+    corners = np.tile((at + np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])).astype(np.float32), (4, 1, 1))
+    made = Micropolygons(corners, np.zeros(count, np.int32), np.zeros(count, np.uint8))
+    return made, moved(made, (1.5, -0.5), 1.0)
+
+
+def test_no_sample_just_inside_is_left_out():
+    """Interleaving places polygons at each time and lens point, and has no bounds that could leave a sample out."""
+    _, moving = squares(400)
+    works = [draw(a, moving, PATTERNS["interleaved"])[1] for a in (motion_interval, motion_interleaved)]
+    assert works[0].total(MotionEvent.SAMPLE_HITS) == works[1].total(MotionEvent.SAMPLE_HITS) > 0
+
+
+@pytest.mark.parametrize("algorithm", [motion_interval, motion_interleaved, None])
+def test_buffers_of_parts_become_one(algorithm):
+    """Polygons that are drawn again and again lie in the buffers of several parts, and the first of them stays."""
+    still, moving = squares(4800)
+    threads, found = get_num_threads(), []
+    for count in (threads, 1):
+        set_num_threads(count)
+        samples = blur_samples(WIDTH, HEIGHT, PATTERNS["stratified"])
+        if algorithm is None:
+            stamps(still, samples, stamp_shape(2, "box"), HOPPER)
+        else:
+            algorithm(moving, PATTERNS["stratified"], samples, HOPPER)
+        found.append(samples)
+    set_num_threads(threads)
+    for name in ("depth", "polygon", "tests", "requests"):
+        np.testing.assert_array_equal(*(getattr(samples, name) for samples in found), err_msg=name)
 
 
 def one_square(way, at=3.0):

@@ -23,8 +23,10 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, c
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     count_hits,
+    draw_in_parts,
     keep_nearest,
     pixel_box,
+    units_of,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
@@ -75,7 +77,8 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
     simt = Simt(*map(int, simt))
     table = np.zeros((-(-len(polygons.patch) // CHUNK), len(AcrossPolygonsEvent)), np.int64)
     idle_to_refill = simt.warp // 2 if packing == "repacked" else simt.warp
-    _across_polygons(polygons.vertices, samples, packing == "sorted", idle_to_refill, simt, table)
+    sort = packing == "sorted"
+    draw_in_parts(_across_polygons, len(table), samples, polygons.vertices, sort, idle_to_refill, simt, table)
     events = AcrossPolygonsEvent
     shared = CHUNK * 4 if packing == "sorted" else 0  # a key and an index of 16 bits each
     streams = sample_streams(polygons.vertices.nbytes, samples, events, table)
@@ -86,7 +89,10 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
 
 
 @kernel
-def _across_polygons(vertices: Any, samples: Samples, sort: bool, idle_to_refill: int, simt: Simt, table: Any) -> None:
+def _across_polygons(
+    part: int, parts: int, samples: Samples, vertices: Any, sort: bool, idle_to_refill: int, simt: Simt, table: Any
+) -> None:
+    """Draw a share of the chunks."""
     lanes = (
         np.zeros((simt.warp, 6, 4), np.int64),  # edges
         np.zeros((simt.warp, 3, 4), np.int64),  # boxes
@@ -97,7 +103,7 @@ def _across_polygons(vertices: Any, samples: Samples, sort: bool, idle_to_refill
     )
     sizes = np.empty(CHUNK, np.int64)
     addresses = np.empty(simt.warp, np.int64)
-    for unit in range(len(table)):
+    for unit in units_of(part, parts, len(table)):
         row = table[unit]
         first = unit * CHUNK
         last = min(len(vertices), first + CHUNK)
@@ -110,19 +116,27 @@ def _across_polygons(vertices: Any, samples: Samples, sort: bool, idle_to_refill
             _box_sizes(vertices, first, last, samples, lanes, sizes)
             order = first + np.argsort(sizes[: last - first], kind="mergesort")
             row[AcrossPolygonsEvent.SORT_WARPS] += SORT_STEPS * (-(-(last - first) // simt.warp))
-        taken = 0
-        while True:
-            idle = 0
-            for lane in range(simt.warp):
-                idle += lanes[5][lane] < 0
-            if idle >= idle_to_refill and taken < len(order):
-                taken = _refill(vertices, order, taken, samples, lanes, row)
-            elif idle == simt.warp:
-                break
-            _step(samples, lanes, simt, row, addresses)
+        _draw_chunk(vertices, order, samples, lanes, idle_to_refill, simt, row, addresses)
 
 
-@kernel
+@kernel(lent=True)
+def _draw_chunk(
+    vertices: Any, order: Any, samples: Samples, lanes: Any, idle_to_refill: int, simt: Simt, row: Any, addresses: Any
+) -> None:
+    """Hand the polygons of a chunk to lanes, in an order, and step through their boxes."""
+    taken = 0
+    while True:
+        idle = 0
+        for lane in range(simt.warp):
+            idle += lanes[5][lane] < 0
+        if idle >= idle_to_refill and taken < len(order):
+            taken = _refill(vertices, order, taken, samples, lanes, row)
+        elif idle == simt.warp:
+            break
+        _step(samples, lanes, simt, row, addresses)
+
+
+@kernel(lent=True)
 def _box_sizes(vertices: Any, first: int, last: int, samples: Samples, lanes: Any, sizes: Any) -> None:
     """Count the samples in the box of each polygon: the keys of the sort."""
     for p in range(first, last):
@@ -131,7 +145,7 @@ def _box_sizes(vertices: Any, first: int, last: int, samples: Samples, lanes: An
         sizes[p - first] = max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0)
 
 
-@kernel
+@kernel(lent=True)
 def _refill(vertices: Any, order: Any, taken: int, samples: Samples, lanes: Any, row: Any) -> int:
     """Give each idle lane the next polygon and set it up; returns how many have been taken."""
     edges, boxes, depths, snapped, walk, polygon = lanes
@@ -150,7 +164,7 @@ def _refill(vertices: Any, order: Any, taken: int, samples: Samples, lanes: Any,
     return taken
 
 
-@kernel
+@kernel(lent=True)
 def _step(samples: Samples, lanes: Any, simt: Simt, row: Any, addresses: Any) -> None:
     """Each lane that has a polygon tests the next sample of its box."""
     edges, _, depths, _, walk, polygon = lanes

@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stages.nonlinear.projections import Projection, cones
 from tilestamp.simulator.stages.stochastic.bounds import Visits
 from tilestamp.simulator.stages.stochastic.tile_lists import MovingLists
 
 BIN = 8  # tiles on a side
 MARGIN = 1e-5  # radians: covers the rounding of a test in float32
+UNSURE = 1e-12  # of a cosine by the sum of two angles: nearer to it, the cosine itself decides
+SMALLEST_PART = 64  # triangles
 
 
 class EdgePlanes(NamedTuple):
@@ -93,32 +96,53 @@ def _visits(
     found: Outlines, triangles: NDArray[Any], looked: NDArray[np.int64], squares: NDArray[np.float64], mask: int
 ) -> Visits:
     """Visits of squares (threads of a triangle, or one, their rows; -1: none), each thread a row."""
-    looked = np.broadcast_to(looked, (len(triangles), *looked.shape[1:]))
-    there = looked >= 0
-    starts = np.concatenate([[0], np.cumsum(there.sum(axis=2).ravel())]).astype(np.int64)
-    of = np.repeat(triangles, there.sum(axis=(1, 2))).astype(np.int64)
-    tiles = looked[there].astype(np.int32)
-    masks = np.empty(len(tiles), np.int64)
-    _look(*found, of, tiles, squares, mask, masks)
+    each = (looked >= 0).sum(axis=2).ravel()  # of a thread
+    if len(looked) == 1:
+        each = np.tile(each, len(triangles))
+    starts = np.concatenate([[0], np.cumsum(each)]).astype(np.int64)
+    tiles, masks = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int64)
+    parts = parts_of(len(triangles), SMALLEST_PART)
+    for_parts(_look, parts, *found, triangles, looked, squares, starts, mask, tiles, masks)
     return Visits(starts, tiles, masks, np.ones(len(tiles), np.int64))
 
 
 @kernel
-def _look(axes: Any, spread: Any, inward: Any, of: Any, tiles: Any, squares: Any, mask: int, masks: Any) -> None:
-    for at in range(len(of)):
-        masks[at] = 0 if misses(axes, spread, inward, of[at], squares[tiles[at]]) else mask
+def _look(
+    part: int, parts: int, axes: Any, spread: Any, inward: Any, triangles: Any, looked: Any, squares: Any, starts: Any,
+    mask: int, tiles: Any, masks: Any,
+) -> None:  # fmt: skip
+    """Look at the squares of a share of the triangles."""
+    angles = squares[:, 3] + MARGIN
+    turns = np.stack((np.sin(angles), np.cos(angles)), axis=1)
+    _, threads, most = looked.shape
+    for t in range(part * len(triangles) // parts, (part + 1) * len(triangles) // parts):
+        p, rows = triangles[t], t if len(looked) > 1 else 0
+        own = (np.sin(spread[p]), np.cos(spread[p]))
+        for k in range(threads):
+            at = starts[t * threads + k]
+            for n in range(most):
+                square = looked[rows, k, n]
+                if square >= 0:
+                    tiles[at] = square
+                    masks[at] = 0 if _misses(axes, spread, inward, p, own, squares, turns, square) else mask
+                    at += 1
 
 
-@kernel
-def misses(axes: Any, spread: Any, inward: Any, p: int, cone: Any) -> bool:
-    """Whether no line of sight in a cone meets triangle p; what is not a number misses nothing."""
-    angle = cone[3] + MARGIN
+@kernel(lent=True)
+def _misses(axes: Any, spread: Any, inward: Any, p: int, own: Any, squares: Any, turns: Any, square: int) -> bool:
+    """Whether no line of sight in a cone meets triangle p; what is not a number misses nothing.
+
+    ``own`` and ``turns``: sine and cosine of the half angles of the triangle's cone, and of each square's.
+    """
+    x, y, z = squares[square, 0], squares[square, 1], squares[square, 2]
+    angle = squares[square, 3] + MARGIN
     if angle < np.pi / 2:
         for k in range(3):
-            away = inward[p, k, 0] * cone[0] + inward[p, k, 1] * cone[1] + inward[p, k, 2] * cone[2]
-            if away < -np.sin(angle):
+            if inward[p, k, 0] * x + inward[p, k, 1] * y + inward[p, k, 2] * z < -turns[square, 0]:
                 return True
     together = angle + spread[p]
     if spread[p] < np.pi / 2 and together < np.pi:
-        return bool(axes[p, 0] * cone[0] + axes[p, 1] * cone[1] + axes[p, 2] * cone[2] < np.cos(together))
+        between = axes[p, 0] * x + axes[p, 1] * y + axes[p, 2] * z
+        apart = between - (turns[square, 1] * own[1] - turns[square, 0] * own[0])
+        return bool(apart < 0) if abs(apart) > UNSURE else bool(between < np.cos(together))
     return False

@@ -198,7 +198,7 @@ def _sample_raster(
                     )  # fmt: skip
 
 
-@kernel
+@kernel(lent=True)
 def _test(
     corners: Any, p: int, aperture: Any, focus: Any, place: Any, time_lens: Any, whole: Any, rays: Any, volumes: Any,
     samples: Samples, tile: int, warp: int, x0: int, y0: int, s: int, scratch: Any, row: Any,
@@ -206,12 +206,14 @@ def _test(
     """Test sample s of every pixel of a tile."""
     seen, weights, a, b, hits = scratch
     hits[:] = 0
+    wide = 1 if place is None else place.shape[0]
     for y in range(y0, min(y0 + tile, samples.height)):
+        i, j = y % wide, x0 % wide - 1  # of the pattern
         for x in range(x0, min(x0 + tile, samples.width)):
+            j = j + 1 if j + 1 < wide else 0
             samples.tests[y, x] += 1
             depth = FAILS
             if place is not None:
-                i, j = y % place.shape[0], x % place.shape[0]
                 for d in range(2):
                     shift = aperture * time_lens[i, j, s, 1 + d]
                     a[d] = shift - (whole[x if d == 0 else y] + place[i, j, s, d])

@@ -79,7 +79,7 @@ def moving_triangles(
     return MovingTriangles(np.ascontiguousarray(np.stack([first, last - first], axis=1)), lens)
 
 
-@kernel
+@kernel(lent=True)
 def seen_from(corners: Any, p: int, time: Any, a: Any, b: Any, seen: Any) -> None:
     """Place triangle p as a sample sees it: X, Y and w of each corner.
 
@@ -93,13 +93,13 @@ def seen_from(corners: Any, p: int, time: Any, a: Any, b: Any, seen: Any) -> Non
         seen[k, 2] = w
 
 
-@kernel
+@kernel(lent=True)
 def edge(seen: Any, i: int, j: int) -> Any:
     """Edge function of corners i and j at the sample: the weight of the third corner."""
     return seen[i, 0] * seen[j, 1] - seen[j, 0] * seen[i, 1]
 
 
-@kernel
+@kernel(lent=True)
 def _owns(seen: Any, i: int, j: int, positive: bool) -> bool:
     """Whether an edge through the sample is a left edge, or a top one: its triangle has the sample."""
     right = seen[j, 2] * seen[i, 1] - seen[i, 2] * seen[j, 1]  # how the edge function grows to the right, and down
@@ -109,7 +109,7 @@ def _owns(seen: Any, i: int, j: int, positive: bool) -> bool:
     return bool(right < 0 or (right == 0 and down < 0))
 
 
-@kernel
+@kernel(lent=True)
 def covers(seen: Any, weights: Any) -> bool:
     """Test a sample: whether the line of sight goes through the triangle, before or behind the eye; fills weights."""
     weights[0], weights[1], weights[2] = edge(seen, 1, 2), edge(seen, 2, 0), edge(seen, 0, 1)
@@ -123,7 +123,7 @@ def covers(seen: Any, weights: Any) -> bool:
     return True
 
 
-@kernel
+@kernel(lent=True)
 def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
     """Depth of a covered sample, 0 near to 1 far; -1 where it lies behind the eye, or before near or behind far."""
     z, w, total = weights[0] * 0, weights[0] * 0, weights[0] + weights[1] + weights[2]
@@ -135,7 +135,7 @@ def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
     return np.float32(0.5 + 0.5 * (z / w))
 
 
-@kernel
+@kernel(lent=True)
 def depth_along(normals: Any, volumes: Any, p: int, ray: Any, weights: Any) -> Any:
     """Test a line of sight from the eye: distance over 1 + distance where it meets triangle p, -1 where it does not.
 

@@ -28,8 +28,10 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, c
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     count_hits,
+    draw_in_parts,
     keep_nearest,
     pixel_box,
+    units_of,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
@@ -94,7 +96,7 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
         raise TilestampError(f"1 to {simt.warp} micropolygons are in flight in a warp, not {lanes}")
     starts = np.flatnonzero(np.diff(polygons.patch, prepend=-1, append=np.iinfo(np.int32).max))
     table = np.zeros((len(starts) - 1, len(BitMaskEvent)), np.int64)
-    _bit_mask(polygons.vertices, starts, samples, KINDS.index(kind), lanes, simt, table)
+    draw_in_parts(_bit_mask, len(table), samples, polygons.vertices, starts, KINDS.index(kind), lanes, simt, table)
     streams = sample_streams(polygons.vertices.nbytes, samples, BitMaskEvent, table)
     work = warp_queue(
         "bit_mask",
@@ -109,8 +111,11 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
 
 
 @kernel
-def _bit_mask(vertices: Any, starts: Any, samples: Samples, kind: int, in_flight: int, simt: Simt, table: Any) -> None:
-    """One patch after another; ``kind`` is 0 plain, 1 facing, 2 depth."""
+def _bit_mask(
+    part: int, parts: int, samples: Samples, vertices: Any, starts: Any, kind: int, in_flight: int, simt: Simt,
+    table: Any,
+) -> None:  # fmt: skip
+    """Draw a share of the patches, one after another; ``kind`` is 0 plain, 1 facing, 2 depth."""
     lanes = (
         np.zeros((in_flight, 6, 4), np.int64),  # edges
         np.zeros((in_flight, 3, 4), np.int64),  # boxes
@@ -119,8 +124,9 @@ def _bit_mask(vertices: Any, starts: Any, samples: Samples, kind: int, in_flight
         np.zeros((in_flight, LANE), np.int64),
         np.full(in_flight, -1, np.int64),  # polygon of each lane, -1: idle
     )
+    found = np.empty((3, simt.warp), np.int64)
     stride = vertices.shape[1] * 12
-    for unit in range(len(table)):
+    for unit in units_of(part, parts, len(table)):
         row = table[unit]
         first, last = starts[unit], starts[unit + 1]
         count, total = contiguous(first * stride, (last - first) * stride, simt.coalescing)
@@ -135,11 +141,11 @@ def _bit_mask(vertices: Any, starts: Any, samples: Samples, kind: int, in_flight
         row[BitMaskEvent.CLEAR_WARPS] += -(-mask.size // simt.warp)
         for group in range(first, last, in_flight):
             _take(vertices, group, min(last, group + in_flight), kind, samples, lanes, row)
-            while _step(box, kind, mask.size <= SHARED_WORDS, samples, mask, nearest, lanes, simt, row):
+            while _step(box, kind, mask.size <= SHARED_WORDS, samples, mask, nearest, lanes, simt, row, found):
                 pass
 
 
-@kernel
+@kernel(lent=True)
 def _take(vertices: Any, first: int, last: int, kind: int, samples: Samples, lanes: Any, row: Any) -> None:
     """Set up the next polygons, a lane each."""
     edges, boxes, depths, snapped, walk, polygon = lanes
@@ -157,16 +163,18 @@ def _take(vertices: Any, first: int, last: int, kind: int, samples: Samples, lan
         walk[lane, 7] = 1 if kind == 1 and area < 0 else 0
 
 
-@kernel
+@kernel(lent=True)
 def _step(
-    box: Any, kind: int, shared: Any, samples: Samples, mask: Any, nearest: Any, lanes: Any, simt: Simt, row: Any
-) -> bool:
-    """Every lane finds its next clear sample and tests it; returns whether any lane had one."""
+    box: Any, kind: int, shared: Any, samples: Samples, mask: Any, nearest: Any, lanes: Any, simt: Simt, row: Any,
+    found: Any,
+) -> bool:  # fmt: skip
+    """Every lane finds its next clear sample and tests it; returns whether any lane had one.
+
+    ``found``: room for the addresses of hits, and their words and bits of the mask.
+    """
     edges, _, depths, _, walk, polygon = lanes
     spp = len(samples.offsets)
-    addresses = np.empty(simt.warp, np.int64)
-    words = np.empty(simt.warp, np.int64)
-    bits = np.empty(simt.warp, np.int64)
+    addresses, words, bits = found[0], found[1], found[2]
     active, hits, reads = 0, 0, 0
     for lane in range(len(polygon)):
         if polygon[lane] < 0:
@@ -213,7 +221,7 @@ def _step(
     return active > 0
 
 
-@kernel
+@kernel(lent=True)
 def _write_mask(mask: Any, words: Any, bits: Any, hits: int, shared: Any, row: Any) -> None:
     """One atomic or of the warp."""
     flat = mask.reshape(-1)

@@ -11,7 +11,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Sampl
 WORD = 32  # bits
 
 
-@kernel
+@kernel(lent=True)
 def patch_box(
     vertices: Any, first: int, last: int, boxes: Any, snapped: Any, samples: Samples
 ) -> tuple[int, int, int, int]:
@@ -35,7 +35,7 @@ def new_mask(box: Any, spp: int, layers: int, with_depth: bool) -> tuple[Any, An
     return np.zeros((layers, rows, words), np.uint32), np.full((kept, words * WORD), np.inf, np.float32)
 
 
-@kernel
+@kernel(lent=True)
 def next_word(box: Any, spp: int, mask: Any, nearest: Any, in_sequence: Any, walk: Any, depths: Any) -> tuple[int, int]:
     """Read words until one has a sample to test, or the lane's box ends; returns words read, depths looked up.
 
