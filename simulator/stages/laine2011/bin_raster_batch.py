@@ -26,18 +26,22 @@ from tilestamp.simulator.stages.laine2011.bin_raster_count import (
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     BIN_SIDE_LOG2,
+    COLUMNS,
+    ROWS,
     SINGLE_TRIANGLE,
     WARP,
     WarpBoxes,
+    X,
+    Y,
     entry_slot,
     header_load,
-    lane_box,
     lane_edges,
     new_boxes,
     room_for,
     small_votes,
     touches,
     walk_votes,
+    warp_boxes,
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 
@@ -83,19 +87,24 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
     The first triangle whose sub-triangles do not all fit, and all after it, are read again later.
     """
     last = min(first + BLOCK, end)
-    go_on = last
-    visible, start = 0, write
-    for triangle in range(first, last):
-        n = int(given.subtriangles[triangle])
-        visible += n > 0
-        if go_on < last:
-            continue
-        if write + n - read > RING:
-            go_on = triangle
-            continue
-        for k in range(n):
-            ring[(write + k) % RING] = triangle * 8 + (SINGLE_TRIANGLE if n == 1 else k)
-        write += n
+    go_on, start = last, write
+    visible, most = 0, 0
+    for triangle in range(first, last):  # several at once
+        n = given.subtriangles[np.uint64(triangle)]
+        visible, most = visible + (n > 0), max(most, n)
+    if most <= 1 and write + visible - read < RING:
+        for triangle in range(first, last):  # without a branch: what is culled is overwritten by the next
+            ring[np.uint64(write & (RING - 1))] = triangle * 8 + SINGLE_TRIANGLE
+            write += given.subtriangles[np.uint64(triangle)]
+    else:
+        for triangle in range(first, last):
+            n = int(given.subtriangles[triangle])
+            if write + n - read > RING:
+                go_on = triangle
+                break
+            for k in range(n):
+                ring[(write + k) % RING] = triangle * 8 + (SINGLE_TRIANGLE if n == 1 else k)
+            write += n
     if events is not None:
         warps = (last - first + WARP - 1) // WARP
         events[BinRasterEvent.READ_STEPS] += 1
@@ -114,23 +123,23 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
 @kernel(lent=True)
 def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int]:
     """Boxes of a warp's triangles; returns the path that follows from them, bins of the largest box, and of all."""
-    largest, area, path = 1, 0, SINGLE
-    last_x, last_y = given.bins_x - 1, given.bins_y - 1
     for lane in range(lanes):
-        slot = entry_slot(ring[(first + lane) % RING], given.misc)
-        boxes.slot[lane] = slot
-        lane_box(boxes, lane, given.headers[slot], given.half_x, given.half_y, BIN_SIDE_LOG2, last_x, last_y)
-        columns, rows = boxes.box[lane, 2], boxes.box[lane, 3]
-        largest = max(largest, columns * rows)
-        area += columns * rows
-        if columns > 2 or rows > 2:
-            path = SLOW
-        elif columns * rows > 1 and path == SINGLE:
-            path = FAST
-    if path == SLOW:
-        for lane in range(lanes):
-            lane_edges(boxes, lane, given.headers[boxes.slot[lane]], given.half_x, given.half_y, BIN_SIDE_LOG2)
-    return path, largest, area
+        boxes.slot[lane] = entry_slot(ring[(first + lane) % RING], given.misc)
+    largest, area, side = warp_boxes(
+        boxes,
+        lanes,
+        given.headers,
+        given.half_x,
+        given.half_y,
+        BIN_SIDE_LOG2,
+        given.bins_x - 1,
+        given.bins_y - 1,
+    )
+    if side <= 2:
+        return (FAST if largest > 1 else SINGLE), largest, area
+    for lane in range(lanes):
+        lane_edges(boxes, lane, given.half_x, given.half_y, BIN_SIDE_LOG2)
+    return SLOW, largest, area
 
 
 @kernel(lent=True)
@@ -152,12 +161,12 @@ def _emit_warp(
     """
     start, stores = used, 0
     for lane in range(lanes):
-        box = boxes.box[lane]
+        x, y = np.int64(boxes.box[X + lane]), np.int64(boxes.box[Y + lane])
         step = 0
-        for row in range(box[3]):
-            for column in range(box[2]):
+        for row in range(np.int64(boxes.box[ROWS + lane])):
+            for column in range(np.int64(boxes.box[COLUMNS + lane])):
                 if path != SLOW or touches(boxes, lane, column, row):
-                    b = box[0] + column + (box[1] + row) * given.bins_x
+                    b = x + column + (y + row) * given.bins_x
                     pairs[used, 0], pairs[used, 1] = b, scratch.ring[(first + lane) % RING]
                     if events is not None:
                         mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
@@ -180,7 +189,7 @@ def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
     for lane in range(lanes):
         new = True
         for other in range(lane - 1, -1, -1):
-            if boxes.box[other, 0] == boxes.box[lane, 0] and boxes.box[other, 1] == boxes.box[lane, 1]:
+            if boxes.box[X + other] == boxes.box[X + lane] and boxes.box[Y + other] == boxes.box[Y + lane]:
                 new = False
                 break
         distinct += new

@@ -22,11 +22,16 @@ TILE_SIDE_LOG2 = 7  # a tile is 8 pixels wide
 SINGLE_TRIANGLE = 7  # low bits of a queue entry whose triangle has its data at its own slot
 
 
+_32, _64, _96, _128, _160 = np.uint64(32), np.uint64(64), np.uint64(96), np.uint64(128), np.uint64(160)
+X, Y, COLUMNS, ROWS = 0, 32, 64, 96  # where those of the lanes begin in ``WarpBoxes.box``
+
+
 class WarpBoxes(NamedTuple):
-    """The triangles of one warp, a row a lane: scratch space of a worker."""
+    """The triangles of one warp: scratch space of a worker."""
 
     slot: NDArray[np.int64]  # (32,) index of header and data
-    box: NDArray[np.int64]  # (32, 4) first column, first row, columns, rows of squares
+    corner: NDArray[np.int32]  # (6 * 32,) x0, y0, x1, y1, x2, y2 of the lanes, side by side
+    box: NDArray[np.int32]  # (4 * 32,) first column, first row, columns, rows of squares, too
     edge: NDArray[np.int64]  # (32, 3) edge functions at the walk's square, largest over that closed square
     step: NDArray[np.int64]  # (32, 6) dx0 dy0 dx1 dy1 dx2 dy2 times the square's side
     bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank, or addresses, of the current instruction
@@ -37,7 +42,8 @@ def new_boxes() -> Any:
     """Make room for the triangles of one warp."""
     return WarpBoxes(
         np.zeros(WARP, np.int64),
-        np.zeros((WARP, 4), np.int64),
+        np.zeros(6 * WARP, np.int32),
+        np.zeros(4 * WARP, np.int32),
         np.zeros((WARP, 3), np.int64),
         np.zeros((WARP, 6), np.int64),
         np.zeros(WARP, np.int64),
@@ -53,34 +59,53 @@ def entry_slot(entry: Any, misc: Any) -> Any:
     return np.int64(misc[entry >> 3]) + part
 
 
-@kernel(lent=True)
-def lane_box(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int, last_x: int, last_y: int) -> None:
-    """Box of one triangle in squares, clamped; (dx, dy) moves its vertices to the region's lower-left corner."""
-    x0, y0, x1, y1, x2, y2 = (
-        header[0] + dx,
-        header[1] + dy,
-        header[2] + dx,
-        header[3] + dy,
-        header[4] + dx,
-        header[5] + dy,
-    )
-    low_x = min(max(min(x0, x1, x2) >> shift, 0), last_x)
-    low_y = min(max(min(y0, y1, y2) >> shift, 0), last_y)
-    box = boxes.box[lane]
-    box[0], box[1] = low_x, low_y
-    box[2] = min(max(max(x0, x1, x2) >> shift, 0), last_x) - low_x + 1
-    box[3] = min(max(max(y0, y1, y2) >> shift, 0), last_y) - low_y + 1
+@kernel(lent=True, inline=True)
+def _squares(a: Any, b: Any, c: Any, move: int, shift: int, last: int) -> Any:
+    """First square, and how many, between three places on an axis."""
+    low, high = np.int32(min(a, b, c) + move) >> shift, np.int32(max(a, b, c) + move) >> shift
+    first = min(max(low, 0), last)
+    return first, min(max(high, 0), last) - first + 1
 
 
 @kernel(lent=True)
-def lane_edges(boxes: WarpBoxes, lane: int, header: Any, dx: int, dy: int, shift: int) -> None:
+def warp_boxes(
+    boxes: WarpBoxes,
+    lanes: int,
+    headers: Any,
+    move_x: int,
+    move_y: int,
+    shift: int,
+    last_x: int,
+    last_y: int,
+) -> tuple[int, int, int]:
+    """Boxes of the triangles at the slots in squares, clamped; moves take vertices to the region's lower-left corner.
+
+    Returns the squares of the largest box, and of all, and the longest side. Compiled code takes several lanes at once.
+    """
+    corner, box = boxes.corner, boxes.box
+    for lane in range(lanes):
+        header = headers[np.uint64(boxes.slot[lane])]
+        for k in range(6):
+            corner[np.uint64(k * WARP + lane)] = header[k]
+    largest, area, side = 1, 0, 1
+    for lane in range(lanes):
+        i = np.uint64(lane)
+        x, columns = _squares(corner[i], corner[i + _64], corner[i + _128], move_x, shift, last_x)
+        y, rows = _squares(corner[i + _32], corner[i + _96], corner[i + _160], move_y, shift, last_y)
+        box[i], box[i + _32], box[i + _64], box[i + _96] = x, y, columns, rows
+        largest, area, side = max(largest, columns * rows), area + columns * rows, max(side, columns, rows)
+    return largest, area, side
+
+
+@kernel(lent=True)
+def lane_edges(boxes: WarpBoxes, lane: int, dx: int, dy: int, shift: int) -> None:
     """Edge functions of one triangle at the first square of its box: the largest value over the closed square."""
     side = np.int64(1) << shift
-    corner_x, corner_y = boxes.box[lane, 0] * side - dx, boxes.box[lane, 1] * side - dy
+    corner_x, corner_y = boxes.box[X + lane] * side - dx, boxes.box[Y + lane] * side - dy
     for k in range(3):
-        j = 2 * ((k + 1) % 3)
-        ax, ay = np.int64(header[2 * k]), np.int64(header[2 * k + 1])
-        ex, ey = header[j] - ax, header[j + 1] - ay
+        i, j = 2 * k * WARP + lane, 2 * ((k + 1) % 3) * WARP + lane
+        ax, ay = np.int64(boxes.corner[i]), np.int64(boxes.corner[i + WARP])
+        ex, ey = boxes.corner[j] - ax, boxes.corner[j + WARP] - ay
         boxes.step[lane, 2 * k], boxes.step[lane, 2 * k + 1] = ex * side, ey * side
         boxes.edge[lane, k] = (ax - corner_x) * ey - (ay - corner_y) * ex + side * (max(ex, 0) - min(ey, 0))
 
@@ -100,9 +125,8 @@ def _count_corner(boxes: WarpBoxes, lanes: int, stride: int, wide: bool, high: b
     boxes.bank[:] = 0
     deepest = 0
     for lane in range(lanes):
-        box = boxes.box[lane]
-        if box[2] > wide and box[3] > high:
-            bank = (box[0] + wide + (box[1] + high) * stride) & (WARP - 1)
+        if boxes.box[COLUMNS + lane] > wide and boxes.box[ROWS + lane] > high:
+            bank = (boxes.box[X + lane] + wide + (boxes.box[Y + lane] + high) * stride) & (WARP - 1)
             boxes.bank[bank] += 1
             deepest = max(deepest, boxes.bank[bank])
     return deepest - 1
@@ -128,12 +152,12 @@ def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[i
         deepest = 0
         end = False
         for lane in range(lanes):
-            box = boxes.box[lane]
-            if step < box[2] * box[3]:
-                column, row = step % box[2], step // box[2]
-                end |= column == box[2] - 1
+            columns = np.int64(boxes.box[COLUMNS + lane])
+            if step < columns * boxes.box[ROWS + lane]:
+                column, row = step % columns, step // columns
+                end |= column == columns - 1
                 if touches(boxes, lane, column, row):
-                    bank = (box[0] + column + (box[1] + row) * stride) & (WARP - 1)
+                    bank = (boxes.box[X + lane] + column + (boxes.box[Y + lane] + row) * stride) & (WARP - 1)
                     boxes.bank[bank] += 1
                     deepest = max(deepest, boxes.bank[bank])
         if deepest > 0:
@@ -157,8 +181,8 @@ def room_for(pairs: Any, used: int, more: int) -> Any:
 def place_pairs(pairs: Any, cursors: Any, entries: Any) -> None:
     """Write the entries of pairs where the cursors of their squares stand."""
     for i in range(len(pairs)):
-        square = pairs[i, 0]
-        entries[cursors[square]] = pairs[i, 1]
+        square = np.uint32(pairs[i, 0])
+        entries[np.uint64(cursors[square])] = pairs[i, 1]
         cursors[square] += 1
 
 

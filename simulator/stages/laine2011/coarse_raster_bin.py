@@ -12,19 +12,23 @@ from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
+    COLUMNS,
+    ROWS,
     SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
     WARP,
     WarpBoxes,
+    X,
+    Y,
     entry_slot,
     header_load,
-    lane_box,
     lane_edges,
     new_boxes,
     room_for,
     small_votes,
     touches,
     walk_votes,
+    warp_boxes,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 
@@ -82,25 +86,28 @@ def _place(given: CoarseInput, b: int) -> Any:
 @kernel(lent=True)
 def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> Any:
     """Boxes of a warp's triangles; returns its case, tiles of the largest, the union and all boxes, and its rows."""
-    small = True
-    largest, area = 1, 0
+    for lane in range(lanes):
+        boxes.slot[lane] = entry_slot(np.int64(given.entries[first + lane]), given.misc)
+    largest, area, side = warp_boxes(
+        boxes,
+        lanes,
+        given.headers,
+        place.move_x,
+        place.move_y,
+        TILE_SIDE_LOG2,
+        place.last_x,
+        place.last_y,
+    )
     low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
     for lane in range(lanes):
-        slot = entry_slot(np.int64(given.entries[first + lane]), given.misc)
-        boxes.slot[lane] = slot
-        header = given.headers[slot]
-        lane_box(boxes, lane, header, place.move_x, place.move_y, TILE_SIDE_LOG2, place.last_x, place.last_y)
-        x, y, columns, rows = boxes.box[lane]
-        small &= columns <= 2 and rows <= 2
-        largest = max(largest, columns * rows)
-        area += columns * rows
+        x, y = boxes.box[X + lane], boxes.box[Y + lane]
         low_x, low_y = min(low_x, x), min(low_y, y)
-        high_x, high_y = max(high_x, x + columns), max(high_y, y + rows)
+        high_x, high_y = max(high_x, x + boxes.box[COLUMNS + lane]), max(high_y, y + boxes.box[ROWS + lane])
     union, rows = (high_x - low_x) * (high_y - low_y), high_y - low_y
-    if small:
+    if side <= 2:
         return CASE_A, largest, union, area, rows
     for lane in range(lanes):
-        lane_edges(boxes, lane, given.headers[boxes.slot[lane]], place.move_x, place.move_y, TILE_SIDE_LOG2)
+        lane_edges(boxes, lane, place.move_x, place.move_y, TILE_SIDE_LOG2)
     return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, area, rows
 
 
@@ -108,11 +115,11 @@ def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: 
 def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int) -> int:
     """List a warp's triangles with the tiles that they touch; returns the pairs in use."""
     for lane in range(lanes):
-        box = boxes.box[lane]
-        for row in range(box[3]):
-            for column in range(box[2]):
+        x, y = np.int64(boxes.box[X + lane]), np.int64(boxes.box[Y + lane])
+        for row in range(np.int64(boxes.box[ROWS + lane])):
+            for column in range(np.int64(boxes.box[COLUMNS + lane])):
                 if case == CASE_A or touches(boxes, lane, column, row):
-                    tile = box[0] + column + (box[1] + row) * BIN_TILES
+                    tile = x + column + (y + row) * BIN_TILES
                     pairs[used, 0], pairs[used, 1] = tile, boxes.slot[lane]
                     used += 1
                     counts[tile] += 1

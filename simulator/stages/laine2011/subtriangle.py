@@ -200,9 +200,17 @@ def _store_plane(
 
 @kernel(error_model="numpy", lent=True)
 def store_attribute_planes(
-    a: Corner, b: Corner, c: Corner, whole: bool, turned: bool, mantissa: int, shift: int, view: View, planes: Any,
+    a: Corner,
+    b: Corner,
+    c: Corner,
+    whole: bool,
+    turned: bool,
+    mantissa: int,
+    shift: int,
+    view: View,
+    planes: Any,
     slot: int,
-) -> None:  # fmt: skip
+) -> None:
     """Write the planes of 1/w, u/w and v/w.
 
     Of a triangle that is ``whole``, u and v are 1 at one corner and 0 at the others; ``turned``: that of u is c.

@@ -80,9 +80,17 @@ def _outcome(screen: Screen, positions: Any, i: int, j: int, k: int, view: View)
 
 @kernel(lent=True)
 def warp_outcomes(
-    screen: Screen, positions: Any, triangles: Any, first: int, n: int, plain: bool, view: View, scratch: Scratch,
-    counting: Counting, out: Setup,
-) -> None:  # fmt: skip
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    first: int,
+    n: int,
+    plain: bool,
+    view: View,
+    scratch: Scratch,
+    counting: Counting,
+    out: Setup,
+) -> None:
     """Find what becomes of n triangles, a lane each; ``plain``: all indices are in range."""
     lanes = counting.lanes
     if plain and _near_outcomes(screen.words, triangles[3 * first : 3 * (first + n)], n, view, lanes):
