@@ -62,8 +62,9 @@ def entry_slot(entry: Any, misc: Any) -> Any:
 @kernel(lent=True, inline=True)
 def _squares(a: Any, b: Any, c: Any, move: int, shift: int, last: int) -> Any:
     """First square, and how many, between three places on an axis."""
-    low, high = np.int32(min(a, b, c) + move) >> shift, np.int32(max(a, b, c) + move) >> shift
-    first = min(max(low, 0), last)
+    low: Any = np.int32(min(a, b, c) + move) >> shift
+    high: Any = np.int32(max(a, b, c) + move) >> shift
+    first: Any = min(max(low, 0), last)
     return first, min(max(high, 0), last) - first + 1
 
 

@@ -9,173 +9,26 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.errors import TilestampError
-from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.borrow import borrow
-from tilestamp.simulator.stages.laine2011.screen_vertices import Screen, screen_vertices
-from tilestamp.simulator.stages.laine2011.subtriangle import ABSENT, KEPT, View
-from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
-    SINGLE,
-    WARP,
-    TriangleSetupEvent,
-    count_vertices,
-    count_warp,
-    forget_warp,
-    new_counting,
-    note_vertices,
-)
-from tilestamp.simulator.stages.laine2011.triangle_setup_outcome import warp_outcomes
-from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
-    Scratch,
-    Setup,
-    clip_and_store,
-    new_scratch,
-    store_whole,
-)
+from tilestamp.simulator.stages.laine2011.screen_vertices import screen_vertices
+from tilestamp.simulator.stages.laine2011.subtriangle import View
+from tilestamp.simulator.stages.laine2011.triangle_setup_count import TriangleSetupEvent
+from tilestamp.simulator.stages.laine2011.triangle_setup_outcome import outcome_part
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import BLOCK, WARP, Setup, store_part, store_several
 from tilestamp.simulator.stages.laine2011.triangle_setup_streams import setup_streams
 from tilestamp.simulator.work import Work
 
 Release = Literal["1.1", "nvdiffrast"]
 
-BLOCK = 64  # threads, a triangle each
 SHARED_BYTES = 4608  # the clip polygons of 64 threads
 SLACK = 4096  # sub-triangle slots beyond one for each triangle, at first
 MAX_SUBTRIANGLES = 2**24
 MAX_SIZE = 2048  # pixels along an axis: 16 bins of 16 tiles of 8 pixels
 SUBTRIANGLE_BYTES = {"1.1": 81, "nvdiffrast": 33}  # count 1, header 16, data 64 or 16
-_WHOLE, _CUT = (
-    0,
-    1,
-)  # columns of the masks of warps: lanes with a sub-triangle at their own slot, uncut or cut by clipping
 _PART_BLOCKS = 64  # blocks that one call of the worker takes, at least
-
-
-@kernel(lent=True)
-def _outcome_range(
-    begin: int,
-    end: int,
-    screen: Screen,
-    positions: Any,
-    triangles: Any,
-    plain: bool,
-    view: View,
-    simt: Simt,
-    out: Setup,
-    masks: Any,
-    scratch: Scratch,
-    counting: Any,
-    vertices: Any,
-    table: Any,
-) -> Any:
-    """Outcomes of all triangles of some whole blocks; returns how many have their sub-triangle at their own slot."""
-    lanes, single = counting.lanes, 0
-    for warp in range(begin, end, WARP):
-        n = min(WARP, end - warp)
-        warp_outcomes(screen, positions, triangles, warp, n, plain, view, scratch, counting, out)
-        mask = masks[warp // WARP]
-        mask[_WHOLE], mask[_CUT] = lanes[KEPT], lanes[SINGLE]
-        single += popcount(np.uint64(lanes[KEPT] | lanes[SINGLE]))
-        if table is not None:
-            row, second = table[warp // BLOCK], warp // WARP % 2
-            corners = triangles[3 * warp : 3 * (warp + n)]
-            note_vertices(counting.lines, corners, n, second, lanes[ABSENT])
-            count_warp(row, counting, n, view, out, simt)
-            if second or warp + WARP >= end:
-                count_vertices(row, vertices, counting.lines, simt)
-        forget_warp(counting)
-    return single
-
-
-@kernel
-def _outcome_part(
-    part: int,
-    parts: int,
-    screen: Screen,
-    positions: Any,
-    triangles: Any,
-    plain: bool,
-    view: View,
-    simt: Simt,
-    out: Setup,
-    masks: Any,
-    vertices: Any,
-    table: Any,
-) -> Any:
-    """Take a share of the blocks, through arrays without reference counts."""
-    begin, end = _share(part, parts, out.subtriangles.size)
-    scratch, counting = new_scratch(), new_counting()
-    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
-    lent, counted = (borrow(masks), borrow(scratch)), (borrow(counting), borrow(vertices[part]))
-    single = _outcome_range(begin, end, screen, positions, triangles, plain, view, simt, out, *lent, *counted, table)
-    scratch.steps[0] = counting.most[0] = 0  # the owners live to here
-    return single
-
-
-@kernel(lent=True)
-def _store_range(
-    begin: int,
-    end: int,
-    record: int,
-    screen: Screen,
-    positions: Any,
-    triangles: Any,
-    view: View,
-    out: Setup,
-    masks: Any,
-    scratch: Scratch,
-) -> None:
-    """Write the sub-triangles that lie at the own slots of their triangles, records from ``record`` on."""
-    for warp in range(begin // WARP, (end + WARP - 1) // WARP):
-        left = np.uint64(masks[warp, _WHOLE] | masks[warp, _CUT])
-        while left:
-            lane = lowest_bit(left)
-            left &= left - np.uint64(1)
-            t = warp * WARP + lane
-            if masks[warp, _CUT] >> lane & 1:
-                clip_and_store(scratch, positions, view, out, t, record, t, triangles)
-            else:
-                store_whole(screen, positions, triangles, t, record, view, out)
-            record += 1
-
-
-@kernel
-def _store_part(
-    part: int,
-    parts: int,
-    records: Any,
-    screen: Screen,
-    positions: Any,
-    triangles: Any,
-    view: View,
-    out: Setup,
-    masks: Any,
-) -> None:
-    """Take a share of the blocks, through arrays without reference counts."""
-    begin, end = _share(part, parts, out.subtriangles.size)
-    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
-    scratch = new_scratch()
-    _store_range(begin, end, records[part], screen, positions, triangles, view, out, borrow(masks), borrow(scratch))
-    scratch.steps[0] = 0  # the owner lives to here
-
-
-@kernel(lent=True)
-def _share(part: int, parts: int, triangles: int) -> Any:
-    """First triangle, and that behind the last, of a share of the blocks."""
-    blocks = (triangles + BLOCK - 1) // BLOCK
-    return blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles)
-
-
-@kernel
-def _store_several(several: Any, records: int, positions: Any, triangles: Any, view: View, out: Setup) -> None:
-    """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
-    scratch = new_scratch()
-    for t in several:
-        first = np.int64(out.misc[t])
-        clip_and_store(scratch, positions, view, out, first, first + records, t, triangles)
 
 
 def as_published(switch: bool | None, release: Release) -> bool:
@@ -312,7 +165,7 @@ def triangle_setup(
         )
         plain = used[0] >= 0 and used[1] < len(positions)
         single = for_parts(
-            _outcome_part, parts, *given, plain, view, simt, out, masks, vertices, table if counting else None
+            outcome_part, parts, *given, plain, view, simt, out, masks, vertices, table if counting else None
         )
         several = np.flatnonzero(out.subtriangles >= 2)
         counts = out.subtriangles[several].astype(np.int64)
@@ -322,9 +175,9 @@ def triangle_setup(
             several, counts = several[:0], counts[:0]
         records = np.cumsum([0, *single])
         out = _new_setup(out.subtriangles, F + int(counts.sum()), int(records[-1] + counts.sum()), words)
-        for_parts(_store_part, parts, records, *given, view, out, masks)
+        for_parts(store_part, parts, records, *given, view, out, masks)
         out.misc[several] = F + np.cumsum(counts) - counts
-        _store_several(several, records[-1] - F, *given[1:], view, out)
+        store_several(several, records[-1] - F, *given[1:], view, out)
     facts = {"numSubtris": needed, "capacity": capacity, "overflow": needed > capacity}
     if not counting:
         return StageResult(out, (), facts)

@@ -21,7 +21,6 @@ from tilestamp.simulator.stages.laine2011.subtriangle import (
 )
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
 
-WARP = 32
 INDEX_BYTES, POSITION_BYTES, HEADER_BYTES = 12, 16, 16
 RECORD_PARTS = 4  # of 16 bytes, in release 1.1
 FIRST_OUTSIDE, ONE_SITE, TWO_SITES, SINGLE, SEVERAL = range(ABSENT + 1, ABSENT + 6)

@@ -4,7 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from tilestamp.models.bits import popcount
 from tilestamp.models.kernel import kernel
+from tilestamp.models.simt import Simt
+from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.screen_vertices import ASIDE, BEYOND, CLIP, Screen, place_of, unpacked
 from tilestamp.simulator.stages.laine2011.subtriangle import (
     ABSENT,
@@ -19,11 +22,27 @@ from tilestamp.simulator.stages.laine2011.subtriangle import (
 from tilestamp.simulator.stages.laine2011.triangle_setup_count import (
     FIRST_OUTSIDE,
     ONE_SITE,
+    SINGLE,
     TWO_SITES,
     Counting,
     count_clipped,
+    count_vertices,
+    count_warp,
+    forget_warp,
+    new_counting,
+    note_vertices,
 )
-from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Scratch, Setup, clip_and_store
+from tilestamp.simulator.stages.laine2011.triangle_setup_paths import (
+    BLOCK,
+    CUT,
+    WARP,
+    WHOLE,
+    Scratch,
+    Setup,
+    clip_and_store,
+    new_scratch,
+    share_of,
+)
 
 GUARD_BAND = 32767  # 1/16 pixel; the largest span, too, that the coverage tables allow
 
@@ -112,3 +131,64 @@ def warp_outcomes(
         lanes[TWO_SITES] |= bit if sites > 1 else 0
         if outcome != ABSENT and screen.codes[i] & BEYOND:
             lanes[FIRST_OUTSIDE] |= bit
+
+
+@kernel(lent=True)
+def _outcome_range(
+    begin: int,
+    end: int,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    plain: bool,
+    view: View,
+    simt: Simt,
+    out: Setup,
+    masks: Any,
+    scratch: Scratch,
+    counting: Any,
+    vertices: Any,
+    table: Any,
+) -> Any:
+    """Outcomes of all triangles of some whole blocks; returns how many have their sub-triangle at their own slot."""
+    lanes, single = counting.lanes, 0
+    for warp in range(begin, end, WARP):
+        n = min(WARP, end - warp)
+        warp_outcomes(screen, positions, triangles, warp, n, plain, view, scratch, counting, out)
+        mask = masks[warp // WARP]
+        mask[WHOLE], mask[CUT] = lanes[KEPT], lanes[SINGLE]
+        single += popcount(np.uint64(lanes[KEPT] | lanes[SINGLE]))
+        if table is not None:
+            row, second = table[warp // BLOCK], warp // WARP % 2
+            corners = triangles[3 * warp : 3 * (warp + n)]
+            note_vertices(counting.lines, corners, n, second, lanes[ABSENT])
+            count_warp(row, counting, n, view, out, simt)
+            if second or warp + WARP >= end:
+                count_vertices(row, vertices, counting.lines, simt)
+        forget_warp(counting)
+    return single
+
+
+@kernel
+def outcome_part(
+    part: int,
+    parts: int,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    plain: bool,
+    view: View,
+    simt: Simt,
+    out: Setup,
+    masks: Any,
+    vertices: Any,
+    table: Any,
+) -> Any:
+    """Take a share of the blocks, through arrays without reference counts."""
+    begin, end = share_of(part, parts, out.subtriangles.size)
+    scratch, counting = new_scratch(), new_counting()
+    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
+    lent, counted = (borrow(masks), borrow(scratch)), (borrow(counting), borrow(vertices[part]))
+    single = _outcome_range(begin, end, screen, positions, triangles, plain, view, simt, out, *lent, *counted, table)
+    scratch.steps[0] = counting.most[0] = 0  # the owners live to here
+    return single

@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.borrow import borrow
 from tilestamp.simulator.stages.laine2011.clipper import MAX_VERTICES, between, clip_triangle
 from tilestamp.simulator.stages.laine2011.plane_equation import reciprocal_area
 from tilestamp.simulator.stages.laine2011.screen_vertices import Screen, place_of
@@ -19,6 +21,13 @@ from tilestamp.simulator.stages.laine2011.subtriangle import (
     store_header,
     survives,
 )
+
+WARP = 32
+BLOCK = 64  # threads, a triangle each
+WHOLE, CUT = (
+    0,
+    1,
+)  # columns of the masks of warps: lanes with a sub-triangle at their own slot, uncut or cut by clipping
 
 
 class Setup(NamedTuple):
@@ -136,3 +145,66 @@ def clip_and_store(
             clip[k, c] = positions[4 * np.int64(triangles[3 * t + k]) + c]
     n = clip_triangle(clip, polygon, scratch.spare, scratch.plane, scratch.steps)
     return _fan(clip, polygon, n, view, out, slot, record, t, triangles), max(n - 2, 0)
+
+
+@kernel(lent=True)
+def share_of(part: int, parts: int, triangles: int) -> Any:
+    """First triangle, and that behind the last, of a share of the blocks."""
+    blocks = (triangles + BLOCK - 1) // BLOCK
+    return blocks * part // parts * BLOCK, min(blocks * (part + 1) // parts * BLOCK, triangles)
+
+
+@kernel(lent=True)
+def _store_range(
+    begin: int,
+    end: int,
+    record: int,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    out: Setup,
+    masks: Any,
+    scratch: Scratch,
+) -> None:
+    """Write the sub-triangles that lie at the own slots of their triangles, records from ``record`` on."""
+    for warp in range(begin // WARP, (end + WARP - 1) // WARP):
+        left = np.uint64(masks[warp, WHOLE] | masks[warp, CUT])
+        while left:
+            lane = lowest_bit(left)
+            left &= left - np.uint64(1)
+            t = warp * WARP + lane
+            if masks[warp, CUT] >> lane & 1:
+                clip_and_store(scratch, positions, view, out, t, record, t, triangles)
+            else:
+                store_whole(screen, positions, triangles, t, record, view, out)
+            record += 1
+
+
+@kernel
+def store_part(
+    part: int,
+    parts: int,
+    records: Any,
+    screen: Screen,
+    positions: Any,
+    triangles: Any,
+    view: View,
+    out: Setup,
+    masks: Any,
+) -> None:
+    """Take a share of the blocks, through arrays without reference counts."""
+    begin, end = share_of(part, parts, out.subtriangles.size)
+    screen, positions, triangles, out = borrow(screen), borrow(positions), borrow(triangles), borrow(out)
+    scratch = new_scratch()
+    _store_range(begin, end, records[part], screen, positions, triangles, view, out, borrow(masks), borrow(scratch))
+    scratch.steps[0] = 0  # the owner lives to here
+
+
+@kernel
+def store_several(several: Any, records: int, positions: Any, triangles: Any, view: View, out: Setup) -> None:
+    """Write the sub-triangles of the triangles that have two or more, to the slots allocated for them."""
+    scratch = new_scratch()
+    for t in several:
+        first = np.int64(out.misc[t])
+        clip_and_store(scratch, positions, view, out, first, first + records, t, triangles)
