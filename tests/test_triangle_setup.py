@@ -138,6 +138,13 @@ def test_far_outside_the_guard_band_is_clipped():
     assert work.total(E.CLIP_LANES) == 1
 
 
+@pytest.mark.parametrize(("width", "clipped"), [(2048, 1), (2047, 0)])
+def test_a_span_that_the_coverage_tables_do_not_have_is_clipped(width, clipped):
+    across = [[-1, -1, 0, 1], [1, -1, 0, 1], [0, 1, 0, 1]]
+    _, (work,), _ = setup(across, [[0, 1, 2]], size=(width, 8), release="1.1")
+    assert work.total(E.CLIP_LANES) == clipped
+
+
 @pytest.mark.parametrize("release", ["1.1", "nvdiffrast"])
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), 3e38, -3e38])
 @pytest.mark.parametrize("component", [0, 1, 2, 3])

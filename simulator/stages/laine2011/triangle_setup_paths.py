@@ -24,10 +24,7 @@ from tilestamp.simulator.stages.laine2011.subtriangle import (
 
 WARP = 32
 BLOCK = 64  # threads, a triangle each
-WHOLE, CUT = (
-    0,
-    1,
-)  # columns of the masks of warps: lanes with a sub-triangle at their own slot, uncut or cut by clipping
+WHOLE, CUT = 0, 1  # columns of the masks of warps: lanes with a sub-triangle at their own slot, uncut or clipped
 
 
 class Setup(NamedTuple):
