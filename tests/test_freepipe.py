@@ -79,6 +79,23 @@ def test_an_unrolled_loop_takes_the_pixels_beyond_a_multiple_of_four_by_themselv
     assert work.total(E.SAMPLE_TESTS) == 60 * 60 + 31
 
 
+def test_long_rows_are_covered_where_all_edge_functions_say_so():
+    """On the widest frame, whose edge functions have the largest numbers."""
+    positions, triangles = soup(40, seed=4, size=0.9)
+    width, height = 16384, 3
+    _, (work,), _ = freepipe(positions, triangles, width, height, Simt())
+    pieces = make_pieces(positions, triangles, width, height)
+    x, y = 16 * np.arange(width) + 8, 16 * np.arange(height)[:, None] + 8
+    hits = 0
+    for corner in pieces.corner[pieces.facing != 0].astype(np.int64).reshape(-1, 3, 2):
+        inside = np.ones((height, width), bool)
+        for (ax, ay), (dx, dy) in zip(corner, np.roll(corner, -1, axis=0) - corner, strict=True):
+            owns = dy < 0 or (dy == 0 and dx > 0)
+            inside &= dx * (y - ay) - dy * (x - ax) >= (0 if owns else 1)
+        hits += inside.sum()
+    assert work.total(E.SAMPLE_HITS) == hits > 50_000
+
+
 def test_lanes_at_the_same_pixel_conflict():
     positions, triangles = flat(TINY * 32)
     _, (work,), _ = freepipe(positions, triangles, 64, 64, Simt())
