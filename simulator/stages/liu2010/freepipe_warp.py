@@ -37,9 +37,7 @@ WIDE = 8  # bytes of a fragment in one word
 
 
 @kernel(lent=True)
-def _count_vertices(
-    triangles: Any, t0: int, lanes: int, simt: Simt, indices: Any, address: Any, row: Any
-) -> None:
+def _count_vertices(triangles: Any, t0: int, lanes: int, simt: Simt, indices: Any, address: Any, row: Any) -> None:
     """Count loads of three indices, known for a full warp, and of three positions a lane."""
     count, size = indices if lanes == WARP else _index_loads(lanes, simt, address)
     mine = triangles[t0 : t0 + lanes]
