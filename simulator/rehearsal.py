@@ -13,19 +13,21 @@ TEXELS = 8
 
 
 def small(scene: Scene) -> Scene:
-    """The first primitives of a scene, without its views."""
+    """The first primitives of a scene, without its views; copied, so that nothing keeps the rest in memory."""
     patches, mesh, splats = scene.patches, scene.mesh, scene.splats
     return Scene(
         scene.name,
-        patches=patches and Patches(patches.points[:PRIMITIVES]),
+        patches=patches and Patches(patches.points[:PRIMITIVES].copy()),
         mesh=mesh and _small_mesh(mesh),
         splats=splats and _small_splats(splats),
     )
 
 
 def _small_splats(splats: Splats) -> Splats:
-    parts: dict[str, Any] = vars(splats)
-    return Splats(**{name: None if part is None else part[:PRIMITIVES] for name, part in parts.items()})
+    parts: dict[str, Any] = {
+        name: part if part is None else part[:PRIMITIVES].copy() for name, part in vars(splats).items()
+    }
+    return Splats(**parts)
 
 
 def _small_mesh(mesh: Mesh) -> Mesh:
@@ -37,8 +39,8 @@ def _small_mesh(mesh: Mesh) -> Mesh:
     }
     for name in ("positions", "colors", "normals", "uvs"):
         parts[name] = None if parts[name] is None else parts[name][used.ravel()]
-    parts["texture_ids"] = None if mesh.texture_ids is None else mesh.texture_ids[:PRIMITIVES]
-    parts["textures"] = tuple(np.ascontiguousarray(image[:TEXELS, :TEXELS]) for image in mesh.textures)
+    parts["texture_ids"] = None if mesh.texture_ids is None else mesh.texture_ids[:PRIMITIVES].copy()
+    parts["textures"] = tuple(image[:TEXELS, :TEXELS].copy() for image in mesh.textures)
     return Mesh(**parts)
 
 

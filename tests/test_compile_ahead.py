@@ -13,6 +13,9 @@ import pytest
 from tilestamp.models import compile_ahead, compile_cache
 from tilestamp.models.kernel import interpreted, kernel
 from tilestamp.models.kernel_files import KernelFiles, release
+from tilestamp.models.machine import load_machine
+from tilestamp.simulator.rehearsal import rehearse, small
+from tilestamp.simulator.scenes import load_scene
 
 compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
@@ -112,3 +115,13 @@ def test_what_is_written_for_one_key_is_not_read_for_another(tmp_path):
     files.save(("float64",), 2)
     assert [files.load(key) for key in (("int64",), ("float64",), ("none",))] == [1, 2, None]
     assert {path.suffix for path in tmp_path.iterdir()} == {".nbc"}
+
+
+@compiled
+def test_the_rehearsal_of_a_run_lists_the_kernels_of_every_launch_and_its_price():
+    scene = small(load_scene("teapot"))
+    run = {"fidelity": "schedule", "counting": True, "picture": True}
+    with interpreted() as calls:
+        rehearse(scene, "micropolygon", load_machine("gtx280"), run, {})
+    names = {found.py_func.__name__ for found, _ in calls}
+    assert {"_dice", "_find_tiles", "_write", "_raster_tiles", "_price"} <= names
