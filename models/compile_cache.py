@@ -15,6 +15,7 @@ STALE_DAYS = 14  # what was not loaded for so long is removed
 _FLAGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")
 _PRUNED = "pruned"  # a file whose age says when stale kernels were last removed
 _listeners: list[Callable[[str], None]] = []
+_starts: list[Callable[[], None]] = []
 _compiling: list[str] = []  # a kernel, and those that it waits for
 
 
@@ -37,6 +38,17 @@ def _folder(named: str, flags: tuple[str, ...]) -> Path:
 def on_compiling(listener: Callable[[str], None] | None) -> None:
     """Tell ``listener``, and no other, what is now being compiled, as ``module.kernel``; ``""`` when nothing is."""
     _listeners[:] = [listener] if listener else []
+
+
+def before_compiling(start: Callable[[], None] | None) -> None:
+    """Call ``start`` once, and no other, when the next kernel is missing that Python calls."""
+    _starts[:] = [start] if start else []
+
+
+def note_missing() -> None:
+    """Say that a kernel is missing that Python calls."""
+    while _starts:
+        _starts.pop()()
 
 
 def note_compiling(function: Callable[..., Any]) -> None:
@@ -92,13 +104,12 @@ def _make_writable(folder: Path) -> bool:
 
 
 def _prune(folder: Path) -> None:
-    """Once a day, remove the kernels that were not loaded for a while; an index is touched when it is."""
+    """Once a day, remove the kernels that were not loaded for a while; a file is touched when it is."""
     mark, now = folder / _PRUNED, time.time()
     with contextlib.suppress(OSError):
         if mark.exists() and now - mark.stat().st_mtime < 86400:
             return
         mark.touch()
-        for index in folder.glob("*.nbi"):
-            if now - index.stat().st_mtime > STALE_DAYS * 86400:
-                for file in folder.glob(f"{index.stem}.*"):
-                    file.unlink()
+        for file in folder.glob("*.nb*"):
+            if now - file.stat().st_mtime > STALE_DAYS * 86400:
+                file.unlink()

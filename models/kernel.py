@@ -6,7 +6,9 @@ kernels that it calls, in whatever module, and the constants and enums that it r
 whose code it changes, and no other; two checkouts share what they have in common.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import local
 from typing import Any, Protocol, overload
 
 from numba import config
@@ -17,6 +19,7 @@ from numba.core.sigutils import normalize_signature
 from tilestamp.models.compile_cache import compiling
 from tilestamp.models.compile_quicker import quicker
 from tilestamp.models.kernel_cache import KernelCache
+from tilestamp.models.kernel_files import release
 from tilestamp.models.kernel_library import for_kernels, gathers, nested, outermost
 
 
@@ -95,5 +98,36 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
             known = self.overloads.get(types_given)
             if known is not None and for_kernels(known.library):
                 del self.overloads[types_given]
-            with quicker(), outermost(self.targetctx.codegen()):
-                return super().compile(sig)
+            try:
+                with quicker(), outermost(self.targetctx.codegen()):
+                    return super().compile(sig)
+            finally:
+                release()
+
+    def claim(self, types_given: Any) -> bool:
+        """Whether it is left to this process to compile it for some types: nobody else does so now."""
+        return self._cache.claim(types_given, self.targetctx, 0.0)
+
+
+@contextmanager
+def interpreted() -> Iterator[dict[tuple[Any, Any], None]]:
+    """Run kernels as the Python that they are; found are those that Python calls, each with types of what it gives."""
+    calls: dict[tuple[Any, Any], None] = {}
+    inside = local()
+
+    def call(kernel: Any, *args: Any) -> Any:
+        outer = not getattr(inside, "kernel", False)
+        if outer:
+            calls[kernel, tuple(map(kernel.typeof_pyval, args))] = None
+            inside.kernel = True
+        try:
+            return kernel.py_func(*args)
+        finally:
+            if outer:
+                inside.kernel = False
+
+    _Dispatcher.__call__ = call
+    try:
+        yield calls
+    finally:
+        del _Dispatcher.__call__

@@ -1,10 +1,8 @@
 """Compiled kernels on disk, under names that say all that they depend on (``tilestamp.models.kernel``)."""
 
 import contextlib
-import os
 import pickle
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from llvmlite.binding import parse_assembly, parse_bitcode
@@ -14,8 +12,9 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 
-from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling
+from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling, note_missing
 from tilestamp.models.kernel_digest import kernel_digest
+from tilestamp.models.kernel_files import KernelFiles
 from tilestamp.models.kernel_library import KernelLibrary, environments, for_kernels, gathers, nested, no_address
 
 _UNREADABLE = (  # of pickle, whatever its bytes happen to say, and of LLVM
@@ -136,6 +135,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def _find(self) -> None:
         if not self._found:
             super().__init__(self._dispatcher.py_func)
+            self._cache_file = KernelFiles(self._cache_path, self._impl.filename_base)
             self._found = True
 
     @property
@@ -155,19 +155,28 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
             rtsys.initialize(target_context)
         else:
             target_context.refresh()
-        index = self._cache_file._index_path  # noqa: SLF001
-        try:
-            found = self._load_overload(sig, target_context)
-            if found is not None:
-                os.utime(index)  # the mark by which pruning sees that it is in use
-        except _UNREADABLE:
-            found = None
-            with contextlib.suppress(OSError):
-                Path(index).unlink()
+        found = self._readable(sig, target_context)
+        if found is None and not nested():
+            note_missing()
+            self.claim(sig, target_context)
+            found = self._readable(sig, target_context)
         if found is None:
             target_context.refresh()
             note_compiling(self._dispatcher.py_func)
         return found
+
+    def claim(self, sig: Any, target_context: Any, *patience: float) -> bool:
+        """``KernelFiles.claim`` for a signature."""
+        self._find()
+        return self._cache_file.claim(self._index_key(sig, target_context.codegen()), *patience)
+
+    def _readable(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return self._load_overload(sig, target_context)
+        except _UNREADABLE:
+            with contextlib.suppress(OSError):
+                self._cache_file.path(self._index_key(sig, target_context.codegen())).unlink()
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled; where nothing can be written it is not kept."""
@@ -189,6 +198,10 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
 
 
 def _fields(sig: Any) -> str:
-    """Fields of the named tuples among some types: a kernel reads a field by its place."""
-    named = [(str(t), t.fields, _fields(t.types)) for t in sig if isinstance(t, types.BaseNamedTuple)]
+    """Home and fields of the named tuples among some types: a kernel reads a field by its place."""
+    named = [
+        (t.instance_class.__module__, str(t), t.fields, _fields(t.types))
+        for t in sig
+        if isinstance(t, types.BaseNamedTuple)
+    ]
     return str(named) if named else ""

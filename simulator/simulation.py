@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
+from tilestamp.models.compile_ahead import compile_ahead
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.price import Fidelity
@@ -15,6 +16,7 @@ from tilestamp.simulator.launchable import check_launches, check_scene
 from tilestamp.simulator.manifest import origin_of
 from tilestamp.simulator.options import Options, plain
 from tilestamp.simulator.pipelines import load_pipeline, pipeline_options
+from tilestamp.simulator.rehearsal import rehearse, small
 from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene, load_scene, read_camera
 from tilestamp.simulator.scenes.camera import clip_matrix
@@ -91,6 +93,8 @@ def simulate(
         drawing = msgspec.structs.replace(drawing, width=own[0], height=own[1])
     width, height = drawing.width, drawing.height
     matrix = clip_matrix(seen_by, width, height)
+    asked_of_all = {"fidelity": fidelity, "counting": counting, "picture": picture}
+    compile_ahead(rehearse, small(scene), pipeline, machine, asked_of_all, options)
     view = pinhole_camera(seen_by, width, height) if chosen.splats else matrix
     execute = Executor(counting=counting, picture=drawing.picture)
     frame = load_pipeline(pipeline)(scene, view, width, height, machine.simt, chosen, execute)
