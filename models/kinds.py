@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tilestamp.models.kernel import kernel
 
 FEW = 100  # units: to group so few costs more than their prices
-PRIME = 0x9E3779B97F4A7C15
+PRIMES = 0x9E3779B1, 0x85EBCA77  # of 32 bits, so that no product is of more than 64
 
 
 class Kinds(NamedTuple):
@@ -55,10 +55,11 @@ def _group(columns: Any, used: Any, marks: Any, table: Any, which: Any, firsts: 
 
     Units meet in ``table`` by a mark of all their events; the number of a kind, from 1, stands at its mark or behind.
     """
-    half, kinds = np.uint64(32), 0
+    half, low, kinds = np.uint64(32), np.uint64(0xFFFFFFFF), 0
     for column in used:
         for i in range(len(marks)):
-            mixed = (marks[i] ^ columns[column, i] ^ (columns[column, i] >> half)) * np.uint64(PRIME)
+            mixed = marks[i] ^ columns[column, i]
+            mixed = (mixed & low) * np.uint64(PRIMES[0]) ^ (mixed >> half) * np.uint64(PRIMES[1])
             marks[i] = mixed ^ (mixed >> half)
     last = np.uint64(len(table) - 1)
     for i in range(len(marks)):

@@ -1,7 +1,7 @@
 """List scheduling: units in order, each to the place that is free first; plain numbers in, plain numbers out.
 
 Every time is a sum, a maximum or the soonest of earlier times, so the end is monotone and of the first degree in all
-costs together (``models.schedule`` says why that matters). A step costs a replay in each of two tournaments.
+costs together (``models.schedule`` says why that matters). A step costs taking a place and an SM (``models.places``).
 """
 
 from typing import Any, NamedTuple
@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tilestamp.models.kernel import kernel
+from tilestamp.models.places import Next, Times, put, times_of
 
 
 class Record(NamedTuple):
@@ -59,19 +60,17 @@ class Room(NamedTuple):
     places : int
     waits, shares : bool
         Whether units wait for a place, and whether they share SMs: else nobody needs to know who is free first.
-    free, free_games : ndarray
-        ``tournament`` of the times at which places are free.
-    served, served_games : ndarray
-        That of the times at which SMs have served what came before: with no more places than SMs, they always have.
+    free : Times
+        When places are free.
+    served : Times
+        When SMs have served what came before: with no more places than SMs, they always have.
     """
 
     places: int
     waits: bool
     shares: bool
-    free: Any
-    free_games: Any
-    served: Any
-    served_games: Any
+    free: Times
+    served: Times
 
 
 class Now(NamedTuple):
@@ -83,10 +82,8 @@ class Now(NamedTuple):
         When it got its place, and leaves it.
     drawn, moved : float
         When the fullest atomic unit, and memory, have served what came before.
-    soonest, idle : float
-        When the next place is free, and when an SM has served what came before.
-    place, server : int
-        Which place and SM that is.
+    free, idle : Next
+        The next place, and the SM that has served what came before.
     end, last, held : float
         End of all; the start of the one that ends last; how long all hold their places.
     """
@@ -95,10 +92,8 @@ class Now(NamedTuple):
     done: float
     drawn: float
     moved: float
-    soonest: float
-    idle: float
-    place: Any
-    server: Any
+    free: Next
+    idle: Next
     end: float
     last: float
     held: float
@@ -118,7 +113,7 @@ def list_schedule(
     room, now, recording = room_of(places, sms, len(which)), nothing_done(pace), len(record.start) > 0
     busy = busy_of(moves, which, pace)
     for i in range(len(which)):
-        kind, place = which[i], now.place if room.waits else i
+        kind, place = which[i], np.int64(now.free.place) if room.waits else i
         now = step(i, sm[kind], alone[kind], *served_of(draws, moves, kind), pace, busy, room, now)
         if recording:
             record.start[i], record.end[i], record.place[i] = now.begun, now.done, place
@@ -143,13 +138,13 @@ def list_schedules(
 @kernel(lent=True, inline=True)
 def step(i: int, sm: float, own: float, draw: float, move: float, pace: Pace, busy: float, room: Room, now: Now) -> Now:
     """Put unit ``i`` to the place that is free first; ``busy``: when memory has served all."""
-    begun, _, drawn, moved, soonest, idle, place, server, end, last, held = now
+    begun, _, drawn, moved, free, idle, end, last, held = now
     begun, late = begun + pace.interval, i >= room.places
     if late:
-        begun = max(begun, soonest)
-    done = max(idle, begun + pace.start) + sm
+        begun = max(begun, free.time)
+    done = max(idle.time, begun + pace.start) + sm
     if room.shares:
-        idle, server = replay(room.served, room.served_games, server, done)
+        idle = put(room.served, idle, done)
     begin = begun
     if draw >= 0.0:
         drawn = max(drawn, begun) + draw
@@ -161,8 +156,8 @@ def step(i: int, sm: float, own: float, draw: float, move: float, pace: Pace, bu
     if done > end:
         end, last = done, begun
     if room.waits:
-        soonest, place = replay(room.free, room.free_games, place, done)
-    return Now(begun, done, drawn, moved, soonest, idle, place, server, end, last, held + (done - begun))
+        free = put(room.free, free, done)
+    return Now(begun, done, drawn, moved, free, idle, end, last, held + (done - begun))
 
 
 @kernel(lent=True, inline=True)
@@ -180,16 +175,15 @@ def busy_of(moves: Any, which: Any, pace: Pace) -> float:
 @kernel(lent=True)
 def nothing_done(pace: Pace) -> Now:
     """Before the first unit."""
-    return Now(-pace.interval, 0.0, 0.0, 0.0, 0.0, 0.0, np.uint32(0), np.uint32(0), 0.0, 0.0, 0.0)
+    first = Next(0.0, np.uint64(0), 0.0)
+    return Now(-pace.interval, 0.0, 0.0, 0.0, first, first, 0.0, 0.0, 0.0)
 
 
 @kernel
 def room_of(places: int, sms: int, units: int) -> Room:
     """All places free, and all SMs idle."""
     waits, shares = units > places, places > sms < units
-    free, free_games = tournament(places if waits else 1)
-    served, served_games = tournament(sms if shares else 1)
-    return Room(places, waits, shares, free, free_games, served, served_games)
+    return Room(places, waits, shares, times_of(places if waits else 1), times_of(sms if shares else 1))
 
 
 @kernel(lent=True)
@@ -199,40 +193,3 @@ def total(costs: Any, which: Any) -> float:
     for i in range(len(which)):
         total += costs[which[i]]
     return total
-
-
-@kernel
-def tournament(players: int) -> Any:
-    """Times of ``players``, and the loser of each game of their tournament, in which the sooner one wins; 0 wins it.
-
-    Game ``g`` is played by the winners of games ``2 g`` and ``2 g + 1``. Times are not below 0, and kept as their bits:
-    as integers these have the same order, and compare sooner.
-    """
-    leaves = 1
-    while leaves < players:
-        leaves *= 2
-    times, losers = np.zeros(leaves), np.zeros(leaves, np.uint32)
-    times[players:] = np.inf
-    for game in range(1, leaves):  # all times are 0: let the left win everywhere, so the right loses
-        leaf = 2 * game + 1
-        while leaf < leaves:
-            leaf *= 2
-        losers[game] = leaf - leaves
-    return times.view(np.uint64), losers
-
-
-@kernel(lent=True, inline=True)
-def replay(times: Any, losers: Any, winner: Any, time: float) -> Any:
-    """Give the winner a later time, and play its games again: the time of whoever wins now, and who it is."""
-    bits = np.float64(time).view(np.uint64)
-    times[winner] = bits
-    game = (winner + np.uint32(len(losers))) >> np.uint32(1)
-    while game > np.uint32(0):
-        loser = losers[game]
-        other = times[loser]
-        beaten = other < bits
-        losers[game] = winner if beaten else loser
-        bits = other if beaten else bits
-        winner = loser if beaten else winner
-        game >>= np.uint32(1)
-    return np.uint64(bits).view(np.float64), winner

@@ -36,8 +36,8 @@ def test_kinds_are_as_many_as_rows_differ():
 
 
 def test_units_of_one_mark_and_other_events_are_two_kinds(monkeypatch):
-    """A prime of 0 gives all units the mark 0."""
-    monkeypatch.setattr(kinds, "PRIME", 0)
+    """Primes of 0 give all units the mark 0."""
+    monkeypatch.setattr(kinds, "PRIMES", (0, 0))
     monkeypatch.setattr(kinds, "_group", kinds.kernel(lent=True)(getattr(kinds._group, "py_func", kinds._group)))
     events = columns(300, 5)
     found = kinds_of(events, used(events))
