@@ -38,11 +38,11 @@ class KernelFiles:
         self._folder = Path(folder)
         self._name = name
 
-    def path(self, key: Any) -> Path:
+    def path(self, key: object) -> Path:
         """File for what ``key`` says in letters: types, options, processor."""
         return self._folder / f"{self._name}-{hashlib.sha256(str(key).encode()).hexdigest()[:16]}.nbc"
 
-    def load(self, key: Any) -> Any:
+    def load(self, key: object) -> Any:
         """Read what was compiled, None if it was not."""
         path = self.path(key)
         try:
@@ -52,7 +52,7 @@ class KernelFiles:
         os.utime(path)  # the mark by which pruning sees that it is in use
         return pickle.loads(kept)  # noqa: S301 - our own
 
-    def save(self, key: Any, compiled: Any) -> None:
+    def save(self, key: object, compiled: object) -> None:
         """Write what was compiled, whole or not at all."""
         path = self.path(key)
         unfinished = path.with_suffix(f".{os.getpid()}")
@@ -67,7 +67,7 @@ class KernelFiles:
         for path in self._folder.glob(f"{self._name}-*.nbc"):
             path.unlink()
 
-    def claim(self, key: Any, patience: float = PATIENCE) -> bool:
+    def claim(self, key: object, patience: float = PATIENCE) -> bool:
         """Tell other processes that this one compiles it now, after one that does so already; say if none is left."""
         if fcntl is None:
             return True

@@ -1,9 +1,12 @@
 """A run made small: a few primitives in a few pixels, by which others learn what kernels it needs."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from tilestamp.models.machine import Machine
+from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes import Scene
 from tilestamp.simulator.scenes.geometry import Mesh, Patches
 from tilestamp.simulator.scenes.splats import Splats
@@ -44,9 +47,14 @@ def _small_mesh(mesh: Mesh) -> Mesh:
     return Mesh(**parts)
 
 
-def rehearse(scene: Scene, pipeline: str, machine: Any, drawing: dict[str, Any], options: dict[str, Any]) -> None:
+def rehearse(
+    simulate: Callable[..., Run],
+    scene: Scene,
+    pipeline: str,
+    machine: Machine,
+    drawing: dict[str, object],
+    options: dict[str, object],
+) -> None:
     """Run it, and price it."""
-    from tilestamp.simulator.simulation import simulate
-
     run = simulate(scene, pipeline, machine, width=WIDTH, height=HEIGHT, **drawing, **options)
     run.stage_rows  # noqa: B018 - they are made where they are read

@@ -94,7 +94,7 @@ def simulate(
     width, height = drawing.width, drawing.height
     matrix = clip_matrix(seen_by, width, height)
     asked_of_all = {"fidelity": fidelity, "counting": counting, "picture": picture}
-    compile_ahead(rehearse, small(scene), pipeline, machine, asked_of_all, options)
+    compile_ahead(rehearse, simulate, small(scene), pipeline, machine, asked_of_all, options)
     view = pinhole_camera(seen_by, width, height) if chosen.splats else matrix
     execute = Executor(counting=counting, picture=drawing.picture)
     frame = load_pipeline(pipeline)(scene, view, width, height, machine.simt, chosen, execute)

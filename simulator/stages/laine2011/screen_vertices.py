@@ -53,8 +53,9 @@ def _project_part(part: int, parts: int, positions: Any, low: int, high: int, vi
         x, y, z, w = positions[at], positions[at + _1], positions[at + _2], positions[at + _3]
         along_z = (w < z) << 4 | (w < -z) << 5
         code = (w < x) | (w < -x) << 1 | (w < y) << 2 | (w < -y) << 3 | along_z
-        comparable = (abs(z) >= zero) & (w == w) & (view.guard_band | (abs(x) >= zero) | (abs(y) >= zero))  # noqa: PLR0124 - NaN
-        code |= 0 if ((along_z if view.guard_band else code) == 0) & comparable else CLIP
+        comparable = (abs(z) >= zero) | ((not view.guard_band) & ((abs(x) >= zero) | (abs(y) >= zero)))
+        whole = ((along_z if view.guard_band else code) == 0) & comparable & (w == w)  # noqa: PLR0124 - NaN
+        code |= 0 if whole else CLIP
         inverse = np.float32(1) / w
         sx, sy = snapped(x, y, inverse, view)
         near = (code == 0) & (abs(sx) < NEAR) & (abs(sy) < NEAR)
