@@ -1,6 +1,7 @@
 """What a machine can run: what its hardware has, and blocks that it can launch, before anything is executed."""
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 import msgspec
@@ -51,9 +52,14 @@ def check_scene(pipeline: str, options: Options, scene: Scene) -> None:
 
 def able_machines(pipeline: str, options: Options) -> Iterator[str]:
     """Machines of the package that can run a pipeline with some options: well known ones first."""
-    for name in (*FIRST, *(name for name in list_machines() if name not in FIRST)):
+    for name in chain(FIRST, _others()):
         if _can_launch(pipeline, plain(options), load_machine(name)):
             yield name
+
+
+def _others() -> Iterator[str]:
+    """Less well known machines; their files are read only where they are needed."""
+    yield from (name for name in list_machines() if name not in FIRST)
 
 
 def _check(pipeline: str, options: Options, machine: Machine) -> None:
