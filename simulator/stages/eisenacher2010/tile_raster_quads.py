@@ -152,7 +152,9 @@ def raster_grids(
     for base in range(first, last, together):
         for k in range(_box_quads(points, lists, base, min(last - base, together), origin, shape, q, row)):
             n = q.found[k]
-            vertex = np.uint64(lists[base + q.grid[n]]) * np.uint64(shape.grid * shape.grid) + np.uint64(q.vertex[n])
+            vertex = np.uint64(lists[base + np.int64(q.grid[n])]) * np.uint64(shape.grid * shape.grid) + np.uint64(
+                q.vertex[n]
+            )
             i0, i1 = int(q.rows[_LEFT + n]), int(q.rows[_RIGHT + n])
             j0, j1 = int(q.rows[_TOP + n]), int(q.rows[_BOTTOM + n])
             for sub in range(shape.side * shape.side):
