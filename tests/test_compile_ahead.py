@@ -15,6 +15,8 @@ from tilestamp.models import compile_ahead, compile_cache
 from tilestamp.models.kernel import interpreted, kernel
 from tilestamp.models.kernel_files import KernelFiles, release
 from tilestamp.models.machine import load_machine
+from tilestamp.simulator.launchable import able_machines
+from tilestamp.simulator.pipelines import pipeline_names, pipeline_options
 from tilestamp.simulator.rehearsal import rehearse, small
 from tilestamp.simulator.scenes import load_scene
 
@@ -134,3 +136,14 @@ def test_a_rehearsal_lists_all_kernels_that_the_run_calls(monkeypatch):
         rehearse(simulate, small(load_scene("teapot")), "micropolygon", machine, {"fidelity": "schedule"}, {})
     assert len(called) > 5
     assert called - {kernel.py_func.__name__ for kernel, _ in calls} <= {"_group"}  # of launches of many blocks alone
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, of what compiled code does in silence
+@pytest.mark.parametrize("pipeline", pipeline_names())
+def test_every_pipeline_can_be_rehearsed(pipeline):
+    options = pipeline_options(pipeline, {})
+    machine = load_machine(next(able_machines(pipeline, options)))
+    scene = "playbot" if options.splats else "teapot" if pipeline == "binned" else "spot"
+    with interpreted() as calls:
+        rehearse(simulate, small(load_scene(scene)), pipeline, machine, {"fidelity": "schedule"}, {})
+    assert len(calls) > 3

@@ -132,7 +132,7 @@ def _piece(places: Any, depths: Any, i: int, j: int, k: int, size: Any, bits: in
     depth[0], depth[1], depth[2] = z0, z1, z2
     area = (np.int64(x1) - x0) * (np.int64(y2) - y0) - (np.int64(y1) - y0) * (np.int64(x2) - x0)
     box[0], box[1], box[2], box[3] = 0, -1, 0, -1
-    pieces.facing[p] = (area > 0) - (area < 0)
+    pieces.facing[p] = int(area > 0) - int(area < 0)
     if area == 0:
         return
     if area < 0:
