@@ -40,6 +40,31 @@ def on_compiling(listener: Callable[[str], None] | None) -> None:
     _listeners[:] = [listener] if listener else []
 
 
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C through that is heard in a callback of LLVM, where Python drops it and the compiler stumbles later."""
+    heard: list[bool] = []
+    usual = sys.unraisablehook
+
+    def hook(dropped: "sys.UnraisableHookArgs") -> None:
+        if issubclass(dropped.exc_type, KeyboardInterrupt):
+            heard.append(True)
+        else:
+            usual(dropped)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    except Exception:
+        if heard:
+            raise KeyboardInterrupt from None
+        raise
+    finally:
+        sys.unraisablehook = usual
+    if heard:
+        raise KeyboardInterrupt
+
+
 def before_compiling(start: Callable[[], None] | None) -> None:
     """Call ``start`` once, and no other, when the next kernel is missing that Python calls."""
     _starts[:] = [start] if start else []

@@ -16,7 +16,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
-from tilestamp.models.compile_cache import compiling
+from tilestamp.models.compile_cache import compiling, interruptible
 from tilestamp.models.compile_quicker import quicker
 from tilestamp.models.kernel_cache import KernelCache
 from tilestamp.models.kernel_files import release
@@ -99,7 +99,7 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
             if known is not None and for_kernels(known.library):
                 del self.overloads[types_given]
             try:
-                with quicker(), outermost(self.targetctx.codegen()):
+                with interruptible(), quicker(), outermost(self.targetctx.codegen()):
                     return super().compile(sig)
             finally:
                 release()

@@ -1,5 +1,6 @@
 """A compiled kernel is kept under a name that says all that it depends on."""
 
+import ctypes
 import importlib
 import os
 import subprocess
@@ -285,3 +286,19 @@ def test_a_helper_whose_bitcode_cannot_be_read_is_made_anew(project, monkeypatch
     file.write_bytes(file.read_bytes().replace(b"BC\xc0\xde", b"....", 1))
     _edit(project / "stage.py", "+ 1", "+ 2")
     assert _kernels_compiled(project, monkeypatch) == (12, ["helper.scaled", "stage.stage"])
+
+
+@pytest.mark.parametrize("stumbles", [False, True])
+def test_ctrl_c_that_a_callback_drops_ends_the_compiler(stumbles):
+    @ctypes.CFUNCTYPE(None)
+    def interrupted():
+        raise KeyboardInterrupt
+
+    def compiled():
+        with compile_cache.interruptible():
+            interrupted()
+            if stumbles:
+                raise RuntimeError("no compiled object yet")
+
+    with pytest.raises(KeyboardInterrupt):
+        compiled()
