@@ -12,7 +12,7 @@ from tilestamp.simulator.stages.laine2011.coverage import centroid_sample, pixel
 from tilestamp.simulator.stages.laine2011.fine_raster import fine_raster
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import FineRasterEvent
 from tilestamp.simulator.stages.laine2011.fine_raster_shade import blend_over
-from tilestamp.simulator.stages.laine2011.frame_buffers import clear_depth_value
+from tilestamp.simulator.stages.laine2011.frame_buffers import FrameBuffers, clear_depth_value, new_buffers
 from tilestamp.simulator.stages.laine2011.subtriangle import DEPTH_MAX
 from tilestamp.simulator.stages.laine2011.triangle_setup import triangle_setup
 
@@ -109,6 +109,16 @@ def test_pictures_are_the_plain_minimum_of_each_sample(seed, release, samples):
             for i in range(size[0]):
                 assert buffers.ids[k, j, i] == ids.get((k, j, i), -1)
                 assert buffers.depth[k, j, i] == depths.get((k, j, i), DEPTH_MAX)
+
+
+@pytest.mark.parametrize(("depth", "updates"), [(DEPTH_MAX - 1, 2), (DEPTH_MAX, 1), (2**32 - 1, 0)])
+def test_the_tiles_largest_depth_is_taken_anew_only_where_a_pixel_had_it(depth, updates):
+    """A tile starts from ``DEPTH_MAX``, which no pixel has where an earlier draw's depths all lie beyond."""
+    pixels = new_buffers(8, 8)
+    buffers = FrameBuffers(pixels.color, np.full_like(pixels.depth, depth), pixels.ids)
+    corners, triangles = [[-3, -3, 0, 1], [3, -3, 0, 1], [0, 3, 0, 1]], [[0, 1, 2]] * 40
+    _, (work,), _ = draw(corners, triangles, (8, 8), buffers=buffers)
+    assert work.total(E.ZMAX_UPDATES) == updates
 
 
 def grid(seed, n=6, shake=0.8):

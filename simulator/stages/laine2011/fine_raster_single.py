@@ -64,7 +64,7 @@ def draw_nearer(draw: Draw, tile: Tile, plane: Any, record: int, mask: Any, colu
         bits &= below(first, -zx, tile.depth, at, draw.later_wins)
         if draw.peel:
             bits &= ~below(first, -zx, tile.zmax, at, True)
-        covered |= bits & below(farthest, 0, tile.depth, at, True)
+        covered |= bits & below(farthest, 0, tile.depth, at, True) & ~below(farthest, 0, tile.depth, at, False)
         write(first, -zx, tile.depth, at, bits)
         write(record, 0, tile.owner, at, bits)
         written |= bits << shift
