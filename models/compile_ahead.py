@@ -23,7 +23,6 @@ from tilestamp.models.compile_cache import before_compiling, cache_folder
 from tilestamp.models.kernel import interpreted
 
 MOST = 3  # processes: the kernels of a run are about 15, of which one takes a fifth of the time
-_COMMAND = f"from {__name__} import main; main()"
 _helpers: list[subprocess.Popen[bytes]] = []
 
 
@@ -44,10 +43,11 @@ def _start(rehearse: Callable[..., object], arguments: tuple[Any, ...]) -> None:
 
 
 def _started(request: bytes) -> "subprocess.Popen[bytes]":
-    """Start one; that its input ends tells it that its parent has."""
+    """Start one, which imports from where this process does; that its input ends tells it that its parent has."""
+    command = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import main; main()"
     silent = subprocess.DEVNULL
     helper = subprocess.Popen(  # noqa: S603 - our own
-        [sys.executable, "-c", _COMMAND], stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True
+        [sys.executable, "-c", command], stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True
     )
     assert helper.stdin  # noqa: S101 - for mypy
     helper.stdin.write(len(request).to_bytes(8) + request)

@@ -129,12 +129,12 @@ def _make_writable(folder: Path) -> bool:
 
 
 def _prune(folder: Path) -> None:
-    """Once a day, remove the kernels that were not loaded for a while; a file is touched when it is."""
+    """Once a day, remove the kernels that were not loaded for a while, and what a killed process left of one."""
     mark, now = folder / _PRUNED, time.time()
     with contextlib.suppress(OSError):
         if mark.exists() and now - mark.stat().st_mtime < 86400:
             return
         mark.touch()
-        for file in folder.glob("*.nb*"):
+        for file in folder.glob("*.*"):
             if now - file.stat().st_mtime > STALE_DAYS * 86400:
                 file.unlink()

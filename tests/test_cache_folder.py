@@ -33,11 +33,11 @@ def test_kernels_that_were_not_loaded_for_long_are_removed(tmp_path, monkeypatch
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "first"))
     folder = tmp_path / "second" / compile_cache.cache_folder().name
     folder.mkdir(parents=True)
-    for name in ("old.nbc", "older_version.nbi", "recent.nbc"):
+    for name in ("old.nbc", "older_version.nbi", "unfinished.4711", "recent.nbc"):
         (folder / name).touch()
     past = time.time() - 2 * compile_cache.STALE_DAYS * 86400
-    for name in ("old.nbc", "older_version.nbi"):
+    for name in ("old.nbc", "older_version.nbi", "unfinished.4711"):
         os.utime(folder / name, (past, past))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "second"))
     compile_cache.cache_folder()
-    assert {path.name for path in Path(folder).glob("*.nb*")} == {"recent.nbc"}
+    assert {path.name for path in Path(folder).glob("*.*")} == {"recent.nbc"}

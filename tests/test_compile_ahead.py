@@ -1,6 +1,6 @@
 """Other processes compile ahead what a run needs, and nobody compiles what another does."""
 
-import os
+import pickle
 import subprocess
 import sys
 import time
@@ -55,7 +55,6 @@ def test_a_rehearsal_lists_what_python_calls_with_its_types():
 @compiled
 def test_a_missing_kernel_has_all_that_are_rehearsed_compiled(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     monkeypatch.setattr(compile_ahead, "get_num_threads", lambda: 2)
     compile_ahead._stop()
     compile_ahead.compile_ahead(rehearsed, np.ones(3))
@@ -74,6 +73,16 @@ def test_on_one_core_nobody_is_started(monkeypatch):
     compile_ahead.compile_ahead(rehearsed, np.ones(3))
     compile_cache.note_missing()
     assert not compile_ahead._helpers
+
+
+def test_a_helper_imports_nothing_that_lies_in_the_current_folder(tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").touch()
+    monkeypatch.chdir(tmp_path)
+    rehearsed = tmp_path / "rehearsed"
+    helper = compile_ahead._started(pickle.dumps((Path.touch, (rehearsed,))))
+    helper.wait(60)
+    helper.stdin.close()
+    assert rehearsed.exists()
 
 
 def test_a_helper_ends_with_its_parent(tmp_path):
