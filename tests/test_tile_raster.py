@@ -120,6 +120,15 @@ def test_nothing_drawn_leaves_background_and_far_depth():
     assert not overdraw.any()
 
 
+def test_a_quad_that_is_one_point_on_a_sample_is_hit_and_has_no_depth_to_show():
+    vertices = some_grids(1)
+    vertices[..., :2] = 5.5
+    _, depth, overdraw, works, *_ = drawn(vertices)
+    assert overdraw[5, 5] == works[0].total(Event.HIT_LANES) == 9
+    assert works[0].total(Event.Z_LANES) == 0
+    assert (depth == 1).all()
+
+
 def test_a_tile_of_four_pixels_leaves_half_of_each_warp_empty():
     works = drawn(some_grids(50), tile=4)[3]
     assert works[0].total(Event.QUAD_LANES) == 16 * works[0].total(Event.QUAD_WARPS)
