@@ -79,6 +79,9 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]  # numba has no types
         super().__init__(*args, **keywords)
         self._cache = KernelCache(self)  # numba has no public way to name a cache
 
+    def _compilation_chain_init_hook(self) -> None:
+        """Look for no extensions of Numba in all that is installed: no kernel of ours takes or calls what they add."""
+
     def add_overload(self, cres: Any) -> None:
         """Keep what was compiled, where Python finds it if it may call it."""
         returned = self.targetctx.data_model_manager[cres.signature.return_type]

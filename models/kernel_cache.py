@@ -3,14 +3,15 @@
 import contextlib
 import pickle
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
-from llvmlite.binding import parse_assembly, parse_bitcode
+from llvmlite.binding import add_symbol, parse_assembly, parse_bitcode
 from numba import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python
 
 from tilestamp.models.compile_cache import cache_folder, note_compiled, note_compiling, note_missing
 from tilestamp.models.kernel_digest import kernel_digest
@@ -119,6 +120,13 @@ class _LoadedLibrary(JITCodeLibrary):  # type: ignore[misc]
         return super()._get_module_for_linking()
 
 
+@cache
+def _find_memory_manager() -> None:
+    """Tell LLVM where Numba's functions in C are; those that Numba compiles beside them each kernel holds itself."""
+    for name, address in _nrt_python.c_helpers.items():
+        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 def _worth_keeping(environment: Any) -> bool:
     return environment.can_cache() and (environment.consts or not environment.globals["__name__"].startswith("numba."))
 
@@ -148,11 +156,11 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         """Load what was compiled for the signature, None if it was not; a file that cannot be read is none.
 
         Numba would first load all that it can compile (``target_context.refresh``), which takes longer than a small
-        frame: what is on disk needs its memory manager alone.
+        frame: what is on disk needs the functions in C of its memory manager alone.
         """
         self._find()
         if gathers():
-            rtsys.initialize(target_context)
+            _find_memory_manager()
         else:
             target_context.refresh()
         found = self._readable(sig, target_context)

@@ -20,6 +20,8 @@ Command = Callable[..., None]
 
 def named_pipeline(arguments: Sequence[str], otherwise: str) -> str:
     """Pipeline that a command line names, whatever else it says."""
+    if not any("pipeline" in argument for argument in arguments):
+        return otherwise
 
     def pipeline_of(*, pipeline: str = otherwise) -> str:
         return pipeline

@@ -11,7 +11,6 @@ from tilestamp.experiments.commands.outputs import check_file, check_png, write_
 from tilestamp.experiments.commands.render_output import as_json, map_path, print_run, write_map, write_png
 from tilestamp.experiments.commands.tables import print_lines
 from tilestamp.experiments.commands.terminal import progress
-from tilestamp.experiments.commands.trace import draw_timeline, write_schedule
 from tilestamp.experiments.commands.why import print_why, why_json, write_tornado
 from tilestamp.models.errors import TilestampError
 from tilestamp.simulator.run import Run
@@ -132,6 +131,8 @@ def _explained(run: Run, why: bool, tornado: Path | None, trace: Path | None, ti
     if found is not None and tornado is not None:
         write_tornado(run, found, tornado)
         lines.append(f"tornado: {tornado}")
+    if trace is not None or timeline is not None:
+        from tilestamp.experiments.commands.trace import draw_timeline, write_schedule
     if trace is not None:
         lines.append(write_schedule(run, trace))
     if timeline is not None:

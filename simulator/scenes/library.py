@@ -1,4 +1,7 @@
-"""Scenes by name: the embedded ones, those on the search path, files, and stand-ins for models that cannot ship."""
+"""Scenes by name: the embedded ones, those on the search path, files, and stand-ins for models that cannot ship.
+
+The reader of each kind of file is imported when such a file is read.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,26 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.paths import is_file
 from tilestamp.models.used import note
-from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
 from tilestamp.simulator.scenes.bpt import read_bpt
 from tilestamp.simulator.scenes.camera import Camera, fit_camera
-from tilestamp.simulator.scenes.clip_space import read_clip_space
 from tilestamp.simulator.scenes.garden import FILE as GARDEN
 from tilestamp.simulator.scenes.garden import garden, garden_copies
-from tilestamp.simulator.scenes.mesh_file import read_mesh
 from tilestamp.simulator.scenes.notes import Notes
-from tilestamp.simulator.scenes.obj_file import read_obj
-from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
-from tilestamp.simulator.scenes.quad_cage import cage_of
 from tilestamp.simulator.scenes.scene import Patches, Scene, Splats, clip_space_scene
 from tilestamp.simulator.scenes.search_path import SearchPath, find_scene, missing_scene, scene_files, scene_name
 from tilestamp.simulator.scenes.sog import META, is_sog, read_sog
-from tilestamp.simulator.scenes.splat_arrays import has_splat_arrays, read_splat_arrays
-from tilestamp.simulator.scenes.splat_ply import has_splats, read_splat_ply
 from tilestamp.simulator.scenes.splat_view import view_of
 from tilestamp.simulator.scenes.stand_ins import NOT_SHIPPED, cut_like
-from tilestamp.simulator.scenes.subpatches import with_mesh
-from tilestamp.simulator.scenes.textured_mesh import with_texture
 from tilestamp.simulator.scenes.views import VIEWS
 
 Kind = Literal["patches", "mesh"] | None
@@ -201,12 +194,20 @@ def _read(name: str, path: Path, kind: Kind, texture: NDArray[np.uint8] | None =
     elif kind == "patches":
         raise TilestampError(f"{path}: only .bpt and .obj files can give patches")
     elif suffix == ".npz":
+        from tilestamp.simulator.scenes.clip_space import read_clip_space
+
         scene = clip_space_scene(read_clip_space(path, notes), name)
     else:
+        from tilestamp.simulator.scenes.mesh_file import read_mesh
+
         scene = Scene(name, mesh=read_mesh(path, notes))
     if kind == "mesh":
+        from tilestamp.simulator.scenes.subpatches import with_mesh
+
         scene = replace(with_mesh(scene), patches=None)
     if texture is not None:
+        from tilestamp.simulator.scenes.textured_mesh import with_texture
+
         scene = with_texture(scene, texture)
     _note_size(scene, path, notes)
     return replace(scene, note="; ".join(notes))
@@ -216,10 +217,15 @@ def _splats(path: Path, notes: Notes) -> Splats | None:
     """Read the splats of a file that has some; None of another."""
     if is_sog(path):
         return read_sog(path, notes)
-    suffix = path.suffix.lower()
-    if suffix == ".ply" and has_splats(path):
-        return read_splat_ply(path, notes)
-    return read_splat_arrays(path, notes) if suffix == ".npz" and has_splat_arrays(path) else None
+    if path.suffix.lower() == ".ply":
+        from tilestamp.simulator.scenes.splat_ply import has_splats, read_splat_ply
+
+        return read_splat_ply(path, notes) if has_splats(path) else None
+    if path.suffix.lower() == ".npz":
+        from tilestamp.simulator.scenes.splat_arrays import has_splat_arrays, read_splat_arrays
+
+        return read_splat_arrays(path, notes) if has_splat_arrays(path) else None
+    return None
 
 
 def _note_size(scene: Scene, path: Path, notes: Notes) -> None:
@@ -236,6 +242,11 @@ def _note_size(scene: Scene, path: Path, notes: Notes) -> None:
 
 def _from_obj(name: str, path: Path, kind: Kind, notes: Notes, texture: NDArray[np.uint8] | None = None) -> Scene:
     """Patches of a cage, the mesh of its polygons, or both; of an embedded cage the surface only."""
+    from tilestamp.simulator.scenes.approximate_catmull_clark import patches_from_cage
+    from tilestamp.simulator.scenes.obj_file import read_obj
+    from tilestamp.simulator.scenes.obj_mesh import mesh_from_obj
+    from tilestamp.simulator.scenes.quad_cage import cage_of
+
     model = read_obj(path, texture)
     if kind == "patches" or path.parent == DATA:
         notes += model.notes

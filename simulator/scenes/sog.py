@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.paths import is_file
 from tilestamp.simulator.scenes.notes import Notes
-from tilestamp.simulator.scenes.splat_ply import CONSTANT, from_smallest_three
 from tilestamp.simulator.scenes.splats import Splats, make_splats
 
 META = "meta.json"
@@ -65,6 +64,8 @@ def _channels(data: bytes, count: int) -> NDArray[np.uint8]:
 
 
 def _decoded(meta: dict[str, Any], image: Callable[[str], NDArray[np.uint8]]) -> Splats:
+    from tilestamp.simulator.scenes.splat_ply import CONSTANT, from_smallest_three
+
     means = meta["means"]
     low, high = (image(name)[:, :3].astype(np.int64) for name in means["files"])
     first, last = np.array(means["mins"]), np.array(means["maxs"])

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.simulator.scenes.scene import Patches
-from tilestamp.simulator.scenes.subpatches import cut, edge_lengths
 
 BISECTIONS = 50
 PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # steps of a two-dimensional low-discrepancy sequence
@@ -60,6 +59,8 @@ def cut_like(cage: Patches, model: Absent) -> Patches:
     model : Absent
         Whose patches to imitate.
     """
+    from tilestamp.simulator.scenes.subpatches import cut, edge_lengths
+
     wanted = edge_lengths(cage) * model.scale / _drawn_edges(model, len(cage.points))
     low, high = 0.0, float(model.patches)
     for _ in range(BISECTIONS):
