@@ -19,6 +19,7 @@ from tilestamp.models.machine import Machine
 from tilestamp.models.numbers import Number, numbers_of
 from tilestamp.models.occupancy import holding_of, residency
 from tilestamp.models.traffic import Traffic, caches_of, traffic
+from tilestamp.models.variants import Variants, some_of
 
 
 class Batch:
@@ -35,9 +36,9 @@ class Batch:
     """
 
     def __init__(self, machines: Sequence[Machine]) -> None:
-        numbers = numbers_of(machines)
+        numbers = machines.numbers if isinstance(machines, Variants) else numbers_of(machines)
         self.order = np.lexsort(numbers.T[::-1])
-        self.numbers, machines = numbers[self.order], [machines[place] for place in self.order]
+        self.numbers, machines = numbers[self.order], some_of(machines, self.order)
         self.machines = machines
         self._holding, self._caches, self._dealing = (_Shared(machines, k) for k in (holding_of, caches_of, dealing_of))
 
@@ -105,6 +106,9 @@ class _Shared:
     """What some machines have in common: one of them for each key, and who has the same."""
 
     def __init__(self, machines: Sequence[Machine], key: Callable[[Machine], Hashable]) -> None:
+        if isinstance(machines, Variants):
+            self._which, self.machines = np.zeros(len(machines), np.intp), [machines[0]]
+            return
         places: dict[Hashable, int] = {}
         self._which = np.array([places.setdefault(key(machine), len(places)) for machine in machines], np.intp)
         _, firsts = np.unique(self._which, return_index=True)

@@ -137,19 +137,20 @@ def _segments(
         together = lanes_near(addresses, first, end, here, segment_bytes)
         waiting &= ~together
         count += 1
-        total += _used(addresses, first, together, access_bytes, segment_bytes) if shrink else segment_bytes
+        total += _used(addresses, first, end, together, access_bytes, segment_bytes) if shrink else segment_bytes
     return count, total
 
 
 @kernel(lent=True)
-def _used(addresses: Any, first: int, together: Any, access_bytes: int, segment_bytes: int) -> int:
-    """Bytes of the smallest part of a segment that holds what some lanes of it access."""
-    low = high = addresses[first + lowest_bit(together)]
-    while together != np.uint64(0):
-        here = addresses[first + lowest_bit(together)]
-        together &= together - np.uint64(1)
-        low, high = min(low, here), max(high, here)
-    return int(_shrunk(low, high + access_bytes, segment_bytes))
+def _used(addresses: Any, first: int, end: int, together: Any, access_bytes: int, segment_bytes: int) -> int:
+    """Bytes of the smallest part of a segment that holds what some lanes of it access, to the last byte of each."""
+    size, here = SECTOR_BYTES, addresses[first + lowest_bit(together)]
+    while size < segment_bytes:
+        begin, room = here // size * size, size - access_bytes + 1  # an access that begins in this room ends in it
+        if together & ~lanes_near(addresses, first, end, begin, room) == np.uint64(0):
+            break
+        size *= 2
+    return size
 
 
 @kernel(lent=True)

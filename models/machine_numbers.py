@@ -42,7 +42,7 @@ def refusal(error: str, sections: dict[str, Any], structs: Mapping[str, type[msg
             get_args(get_type_hints(structs[section], include_extras=True)["per_clock"])[1],
             values["per_clock"],
         )
-        key = next(key for key, rate in values.items() if not _is_within(rate, kind.__metadata__[0]))
+        key = next(key for key, rate in values.items() if not within(rate, kind.__metadata__[0]))
         place = f"{section}.per_clock.{key}"
     limits = getattr(kind, "__metadata__", (None,))[0]
     if not isinstance(limits, msgspec.Meta):
@@ -55,9 +55,13 @@ def refusal(error: str, sections: dict[str, Any], structs: Mapping[str, type[msg
     return f"{place} is {value}, and no machine has that: it is {what} {low} to {_read(limits.le)}"
 
 
-def _is_within(rate: object, limits: msgspec.Meta) -> bool:
-    low, high = float(limits.ge or 0), float(limits.le or 0)
-    return isinstance(rate, int | float) and not isinstance(rate, bool) and low <= rate <= high
+def within(rate: object, limits: msgspec.Meta) -> bool:
+    """Whether a number is one within limits."""
+    if not isinstance(rate, int | float) or isinstance(rate, bool):
+        return False
+    low = float(limits.ge or limits.gt or 0)
+    above = low <= rate if limits.gt is None else low < rate
+    return above and rate <= float(limits.le or 0)
 
 
 def _read(limit: float | None) -> str:

@@ -73,7 +73,12 @@ class Number(IntEnum):
     MEMORY_L2_GAP_LINES_PER_CLOCK = 49
 
 
-_read = attrgetter(*(number.name.lower().replace("_", ".", 1) for number in Number))
+def key_of(number: Number) -> str:
+    """Dotted name of a number in a machine."""
+    return number.name.lower().replace("_", ".", 1)
+
+
+_read = attrgetter(*map(key_of, Number))
 
 
 def numbers_of(machines: Sequence[Machine]) -> NDArray[np.float64]:

@@ -138,11 +138,14 @@ def check_prices(launches: Sequence[Launch | PipeLaunch], machine: Machine) -> N
             check_pipe(launch, machine)
 
 
-def taken(machines: Sequence[Machine]) -> list[Machine]:
+def taken(machines: Sequence[Machine]) -> Sequence[Machine]:
     """Note that prices are made on machines, and take their fitted numbers as they are moved now."""
+    if not (moved_number() or collecting()):
+        return machines
+    machines = list(machines)
     for machine in machines:
         note_machine(machine)
-    return [machine.as_moved for machine in machines] if moved_number() or collecting() else list(machines)
+    return [machine.as_moved for machine in machines]
 
 
 def _check(fidelity: str) -> None:

@@ -1,6 +1,7 @@
 """Prices: what one run takes on many machines, an array row a machine, a column a launch."""
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.launch import Launch, PipeLaunch
-from tilestamp.models.machine import Machine, altered, load_machine
+from tilestamp.models.machine import Machine, load_machine
 from tilestamp.models.occupancy import holding_of
 from tilestamp.models.price import Fidelity, Times, check_prices, no_times, prices, taken
+from tilestamp.models.variants import Variants, some_of, variants
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.work import FixedFunctionWork, Work
 
@@ -30,7 +32,7 @@ class Prices:
 
     Parameters
     ----------
-    machines : tuple of Machine
+    machines : sequence of Machine
     stages, kernels : tuple of str
         Of each launch, in launch order.
     milliseconds, low, high : ndarray, (machines, launches), float64
@@ -41,7 +43,7 @@ class Prices:
         By place among ``machines``: why the run has no price there.
     """
 
-    machines: tuple[Machine, ...]
+    machines: Sequence[Machine]
     stages: tuple[str, ...]
     kernels: tuple[str, ...]
     milliseconds: NDArray[np.float64]
@@ -69,33 +71,12 @@ class Prices:
         return pd.DataFrame(rows)
 
 
-def variants(machine: Machine, numbers: Mapping[str, ArrayLike]) -> list[Machine]:
-    """Machines that differ from one in some numbers.
-
-    Parameters
-    ----------
-    machine : Machine
-    numbers : mapping of str to array, (machines,)
-        By dotted name (``sm.clock_mhz``); a DataFrame with such columns will do. A lone number is that of all.
-
-    Raises
-    ------
-    TilestampError
-        Columns of unequal length, or what ``altered`` refuses.
-    """
-    columns = {key: np.atleast_1d(np.asarray(column)) for key, column in numbers.items()}
-    lengths = {len(column) for column in columns.values()} - {1}
-    if len(lengths) > 1 or any(column.ndim != 1 for column in columns.values()):
-        told = ", ".join(f"{key} {column.shape}" for key, column in columns.items())
-        raise TilestampError(f"numbers of many machines need one length, not {told}")
-    rows = zip(*np.broadcast_arrays(*columns.values()), strict=True) if columns else ()
-    return [altered(machine, dict(zip(columns, row, strict=True))) for row in rows]
-
-
-def machines_of(machines: Machines, base: Machine) -> list[Machine]:
+def machines_of(machines: Machines, base: Machine) -> Sequence[Machine]:
     """Machines as ``Run.prices`` takes them."""
     if isinstance(machines, Mapping) or hasattr(machines, "columns"):
         return variants(base, machines)  # type: ignore[arg-type]  # a DataFrame has items, as a mapping
+    if isinstance(machines, Variants):
+        return machines
     if isinstance(machines, Machine | str | Path):
         return [load_machine(machines)]
     return [load_machine(machine) for machine in machines]
@@ -121,9 +102,28 @@ def prices_of(
     skip : bool
         Whether a machine without a price is left out.
     """
+    groups, refusals = _groups(machines, launches_on, skip=skip)
+    shape = len(machines), len(works)
+    times = no_times(shape, "")
+    for launches, places in groups:
+        _fill(times, launches, some_of(machines, places), places, fidelity)
+    stages, kernels = tuple(work.stage for work in works), tuple(work.kernel for work in works)
+    machines = machines if isinstance(machines, Variants) else tuple(machines)
+    return Prices(machines, stages, kernels, *times, refusals)
+
+
+def _groups(
+    machines: Sequence[Machine], launches_on: Callable[[Machine], Launches], *, skip: bool
+) -> tuple[list[tuple[Launches, NDArray[np.intp]]], dict[int, str]]:
+    """Launches, and the places of machines that have them; why others have none, by place."""
     groups: dict[int, tuple[Launches, list[int]]] = {}
     refusals: dict[int, str] = {}
     known: dict[Hashable, Launches] = {}
+    if isinstance(machines, Variants):
+        with suppress(TilestampError):  # with what each of them is called
+            launches = launches_on(machines[0])
+            check_prices(launches, machines[0])
+            return [(launches, np.arange(len(machines)))], refusals
     for place, machine in enumerate(machines):
         try:
             key = _launching(machine)
@@ -137,12 +137,7 @@ def prices_of(
             refusals[place] = str(error)
         else:
             groups.setdefault(id(known[key]), (known[key], []))[1].append(place)
-    shape = len(machines), len(works)
-    times = no_times(shape, "")
-    for launches, places in groups.values():
-        _fill(times, launches, [machines[place] for place in places], np.array(places), fidelity)
-    stages, kernels = tuple(work.stage for work in works), tuple(work.kernel for work in works)
-    return Prices(tuple(machines), stages, kernels, *times, refusals)
+    return [(launches, np.array(places)) for launches, places in groups.values()], refusals
 
 
 def _launching(machine: Machine) -> Hashable:
@@ -152,7 +147,7 @@ def _launching(machine: Machine) -> Hashable:
 
 
 def _fill(
-    times: Times, launches: Launches, machines: list[Machine], places: NDArray[np.intp], fidelity: Fidelity
+    times: Times, launches: Launches, machines: Sequence[Machine], places: NDArray[np.intp], fidelity: Fidelity
 ) -> None:
     """Price machines of one mix in parts, side by side."""
     machines = taken(machines)

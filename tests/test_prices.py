@@ -45,7 +45,7 @@ def test_a_machine_of_another_mix_is_priced_by_that(run):
 def test_numbers_of_many_machines_are_taken_as_columns(run, numbers):
     got = run.prices(numbers)
     assert [machine.sm.clock_mhz for machine in got.machines] == NUMBERS["sm.clock_mhz"]
-    assert got.frame.tolist() == run.prices(variants(run.machine, NUMBERS)).frame.tolist()
+    assert got.frame.tolist() == run.prices(list(variants(run.machine, NUMBERS))).frame.tolist()
 
 
 def test_a_lone_number_is_that_of_all_machines(run):
@@ -76,6 +76,15 @@ def test_a_machine_without_a_price_is_refused_or_skipped(run):
     assert "simulate again on it" in got.refusals[1]
     assert np.isnan(got.frame[:2]).all()
     assert got.frame[2] == pytest.approx(run.milliseconds)
+
+
+def test_columns_of_a_machine_without_a_price_say_so_of_each(run):
+    got = run.prices(variants(load_machine("gtx280"), NUMBERS), skip=True)
+    assert ["sm.clock_mhz=1500.0, memory.dram_gb_per_s=200.0" in got.refusals[place] for place in range(3)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 PIPELINES = [(name, machine) for name in pipeline_names() for machine in ("gtx280", "gtx680", "h200")]

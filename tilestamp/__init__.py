@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from tilestamp.experiments.studies.study_file import read_study
     from tilestamp.models.errors import TilestampError
     from tilestamp.models.machine import Machine, altered, list_machines, load_machine
-    from tilestamp.simulator.prices import Prices, variants
+    from tilestamp.models.variants import variants
+    from tilestamp.simulator.prices import Prices
     from tilestamp.simulator.run import Run
     from tilestamp.simulator.scenes import LookAt, ModelToClip, Scene, list_scenes, load_scene
     from tilestamp.simulator.simulation import simulate
@@ -36,7 +37,7 @@ _HOMES = {
     "load_scene": "simulator.scenes",
     "read_study": "experiments.studies.study_file",
     "simulate": "simulator.simulation",
-    "variants": "simulator.prices",
+    "variants": "models.variants",
 }
 
 __all__ = [
