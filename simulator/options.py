@@ -113,7 +113,10 @@ def _readings(value: object) -> list[object]:
 def _array(kind: type, value: object) -> Any:
     """Turn nested lists back into an array of bytes."""
     if get_origin(kind) is np.ndarray and isinstance(value, list):
-        return np.array(value, np.uint8)
+        array = np.array(value, np.uint8)
+        if not np.array_equal(array, value):
+            raise ValueError("fractions are no bytes")
+        return array
     return value
 
 
