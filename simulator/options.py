@@ -111,9 +111,9 @@ def _readings(value: object) -> list[object]:
 
 
 def _array(kind: type, value: object) -> Any:
-    """Turn nested lists back into an array of bytes."""
-    if get_origin(kind) is np.ndarray and isinstance(value, list):
-        array = np.array(value, np.uint8)
+    """Turn nested lists, or numbers of another type, into an array of bytes."""
+    if get_origin(kind) is np.ndarray and isinstance(value, list | np.ndarray):
+        array = np.asarray(value, np.uint8)
         if not np.array_equal(array, value):
             raise ValueError("fractions are no bytes")
         return array

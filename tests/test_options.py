@@ -95,7 +95,7 @@ def test_a_texture_is_an_array_or_its_nested_lists():
     texture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     back = options("micropolygon", **plain(options("micropolygon", texture=texture)))
     assert np.array_equal(back.texture, texture)
-    for wrong in ("brick", [[[300, 0, 0]]], [[[0.5, 0, 0]]], [[[0, 1], [0]]]):
+    for wrong in ("brick", np.full((1, 1, 3), 0.5), [[[300, 0, 0]]], [[[0.5, 0, 0]]], [[[0, 1], [0]]]):
         with pytest.raises(TilestampError, match="texture takes an array or none, not"):
             options("micropolygon", texture=wrong)
 
