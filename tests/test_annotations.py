@@ -24,6 +24,7 @@ FOREIGN = {  # what they take belongs to a library without types
     "models/bits.py": "numba",
     "simulator/stages/borrow.py": "numba",
     "simulator/stages/prefetch.py": "numba",
+    "simulator/stages/vectors.py": "numba",
     "simulator/stages/kerbl2023/blend_step.py": "numba",
     "simulator/stages/laine2011/exact.py": "numba",
     "simulator/stages/laine2011/lanes.py": "numba",

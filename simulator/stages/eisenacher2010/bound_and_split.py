@@ -25,7 +25,7 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.eisenacher2010.bezier import LANES, screen_points
+from tilestamp.simulator.stages.eisenacher2010.bezier import screen_points
 from tilestamp.simulator.stages.eisenacher2010.bucket_scan import bucket_scan
 from tilestamp.simulator.stages.eisenacher2010.oracle import ACROSS, CULL, KEEP, Path, examine
 from tilestamp.simulator.stages.eisenacher2010.split_counts import (
@@ -36,7 +36,6 @@ from tilestamp.simulator.stages.eisenacher2010.split_counts import (
 )
 
 BLOCK = 256  # threads, a sub-patch each
-GRID_SIDE = 4  # control points
 MAX_DEPTH = 14  # halvings: a queue entry packs level, i and j into 4 + 14 + 14 bits
 MAX_QUEUE = 2**24  # sub-patches
 
@@ -136,7 +135,7 @@ def bound_and_split(
         whole_pixels = bound_rule == "pixel_extent"
         parts = parts_of(len(path), BLOCK)
         for_parts(
-            examine, parts, GRID_SIDE, LANES, screen, queue, path, size, limit, whole_pixels,
+            examine, parts, screen.reshape(-1), queue, path, size, limit, whole_pixels,
             min_depth, max_depth,
         )  # fmt: skip
         slots = (path == KEEP).astype(np.uint32)

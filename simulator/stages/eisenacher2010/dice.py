@@ -1,8 +1,8 @@
 """Dice: every sub-patch becomes a 4x4 grid of shaded vertices (Eisenacher & Loop 2010, section 3).
 
 "Then we evaluate a 4x4 grid for each sub-patch and shade the vertices. Position and color are written to a VBO." Like
-the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch. The kernel here evaluates grids as
-tensor products instead, rows first, a batch of them side by side, which changes no count.
+the original we evaluate in float32: a thread a vertex, a half-warp a sub-patch, which is a vector here. It evaluates
+tensor products, rows first, which changes no count.
 
 A vertex is 16 bytes: x, y in pixels from the top left corner, depth z/w, and the colour as RGBA8 in the bits of the
 fourth float. Dice also leaves the box of the 16 vertices, which bucketing needs.
@@ -13,41 +13,42 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tilestamp.models.bits import lowest_bit
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.eisenacher2010 import shading
 from tilestamp.simulator.stages.eisenacher2010.bezier import (
-    LANES,
-    Squares,
+    ONE,
+    POINTS,
     basis,
     evaluate,
     evaluate_point,
-    gather,
-    new_squares,
+    parameters,
+    places,
     restrict,
     screen_points,
-    set_square,
+    side_of,
+    slopes,
 )
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import SubPatches
 from tilestamp.simulator.stages.eisenacher2010.dice_counts import BLOCK, VERTICES, dice_work
 from tilestamp.simulator.stages.eisenacher2010.larger_grids import GridSide, joined, squares
 from tilestamp.simulator.stages.eisenacher2010.shading import (
-    COLOR,
-    MATT,
-    NORMAL,
     NUDGE,
-    Grid,
+    checker,
+    colored,
+    cross,
     lighting,
-    new_grid,
-    set_normals,
-    shade,
-    tangent,
+    lit,
+    tangents,
+    texels,
 )
+from tilestamp.simulator.stages.vectors import bits, first, greatest, least, load, spread, store, store_vertices
 
 GRID_SIDE = 4  # vertices
+UNSHADED = np.uint32(0xFF000000).view(np.float32)  # black, in the bits of a number
 
 
 class Grids(NamedTuple):
@@ -58,106 +59,79 @@ class Grids(NamedTuple):
 
 
 @kernel(lent=True)
-def _borrow_normals(grid: Grid, net: Any, squares: Squares, lanes: int, values: Any) -> None:
+def _borrow(
+    nets: Any, at: Any, dimensions: int, u: Any, v: Any, missing: Any, normal: Any, scratch: Any, values: Any
+) -> Any:
     """Where tangents vanish or are parallel, take the normal a little nearer to the middle of the patch.
 
-    ``values`` (6, 4): a coordinate a row, point and derivatives along u and v; and two rows of scratch.
+    ``scratch`` is five rows of 16 numbers; ``values`` a point of the patch and its derivatives along u and v, a
+    coordinate a row, and two rows of scratch.
     """
-    middle = np.float32(0.5)
-    values[3, 0] = 1
-    for n in range(lanes):
-        for k in range(VERTICES):
-            at = k * LANES + n
-            if grid.rows[MATT + at] > 0:
-                continue
-            u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / np.float32(3)
-            v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / np.float32(3)
-            evaluate_point(net, n, u + (middle - u) * NUDGE, v + (middle - v) * NUDGE, values[4:], values)
-            ux, uy, uz = tangent(values, 1)
-            vx, vy, vz = tangent(values, 2)
-            grid.rows[NORMAL + at] = uy * vz - uz * vy
-            grid.rows[NORMAL + shading.VERTICES + at] = uz * vx - ux * vz
-            grid.rows[NORMAL + 2 * shading.VERTICES + at] = ux * vy - uy * vx
+    middle, rows, near = np.float32(0.5), values[4:], values[:4]
+    store(scratch, 0, u)
+    store(scratch, POINTS, v)
+    for d in range(3):
+        store(scratch, (2 + d) * POINTS, normal[d])
+    while missing != np.uint64(0):
+        k = lowest_bit(missing)
+        missing &= missing - np.uint64(1)
+        u_k, v_k = scratch[k], scratch[POINTS + k]
+        evaluate_point(nets, at, dimensions, u_k + (middle - u_k) * NUDGE, v_k + (middle - v_k) * NUDGE, rows, near)
+        w = (near[3, 0], near[3, 1], near[3, 2])
+        x = tangents((near[0, 0], near[0, 1], near[0, 2]), w)
+        y = tangents((near[1, 0], near[1, 1], near[1, 2]), w)
+        z = tangents((near[2, 0], near[2, 1], near[2, 2]), w)
+        scratch[2 * POINTS + k], scratch[3 * POINTS + k], scratch[4 * POINTS + k], _ = cross(x, y, z)
+    return load(scratch, 2 * POINTS), load(scratch, 3 * POINTS), load(scratch, 4 * POINTS)
 
 
-@kernel(lent=True)
-def _set_boxes(s: Any, box: Any) -> None:
-    """Bound the vertices of all lanes."""
-    for n in range(box.shape[0] // 4):
-        x0 = x1 = s[n]
-        y0 = y1 = s[shading.VERTICES + n]
-        for k in range(LANES, shading.VERTICES, LANES):
-            x, y = s[k + n], s[shading.VERTICES + k + n]
-            x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
-        box[n], box[LANES + n], box[2 * LANES + n], box[3 * LANES + n] = x0, y0, x1, y1
-
-
-@kernel(lent=True)
-def _store_grids(grid: Grid, first: Any, lanes: int, vertices: Any, boxes: Any) -> None:
-    """Write the vertices of each lane, and their box."""
-    _set_boxes(grid.rows, grid.box)
-    for n in range(lanes):
-        s, box = grid.rows[n:], grid.box[n:]
-        for k in range(VERTICES):
-            vertices[first + n, k, 0] = s[k * LANES]
-            vertices[first + n, k, 1] = s[shading.VERTICES + k * LANES]
-            vertices[first + n, k, 2] = s[3 * shading.VERTICES + k * LANES]
-            vertices[first + n, k, 3] = s[COLOR + k * LANES]
-        for k in range(4):
-            boxes[first + n, k] = box[k * LANES]
-
-
-@kernel(error_model="numpy", lent=True)
-def _project(s: Any) -> None:
-    """Divide the screen rows of all vertices by w."""
-    for k in range(shading.VERTICES):
-        scale = np.float32(1) / s[2 * shading.VERTICES + k]
-        s[k] *= scale
-        s[shading.VERTICES + k] *= scale
-        s[3 * shading.VERTICES + k] *= scale
-
-
-@kernel
+@kernel(error_model="numpy")
 def _dice(
     part: int,
     parts: int,
-    side: Any,
-    width: int,
     subpatches: Any,
     nets: Any,
+    weighted: bool,
     screen: Any,
     light: Any,
     texture: Any,
-    shaded: Any,
+    shaded: bool,
     vertices: Any,
     boxes: Any,
 ) -> None:
-    """Dice one part of the sub-patches, ``width`` (LANES) side by side; the last one fills lanes that are left."""
-    grid, squares = new_grid(side, width), new_squares(width)
-    corners, net = np.empty(4 * VERTICES * width, np.float32), np.empty(nets.shape[1] * VERTICES * width, np.float32)
-    gathered = np.full((2, width), -1, np.int32)
-    values = np.zeros((6, 4), np.float32)
-    number = boxes.shape[0]
-    batches = (number + LANES - 1) // LANES
-    for first in range(part * batches // parts * LANES, (part + 1) * batches // parts * LANES, LANES):
-        lanes = min(LANES, number - first)
-        for n in range(width):
-            set_square(squares, n, subpatches, first + min(n, lanes - 1))
-        basis(squares.i, squares.side, grid.by_u, grid.slope_u)
-        basis(squares.j, squares.side, grid.by_v, grid.slope_v)
-        gather(screen, squares.patch, gathered[0], corners)
-        restrict(corners, grid.by_u, grid.by_v, grid.between, grid.screen)
-        _project(grid.rows)
+    """Dice one part of the sub-patches; ``nets`` are 16 numbers a coordinate, the fourth the weights if there are."""
+    column, row = places()
+    scratch, values = np.zeros(5 * POINTS, np.float32), np.zeros((6, 4), np.float32)
+    values[3, 0] = 1
+    number, dimensions = boxes.shape[0], 4 if weighted else 3
+    for n in range(number * part // parts, number * (part + 1) // parts):
+        patch, side = np.int64(subpatches.patch[n]), side_of(subpatches.level[n])
+        u, v = parameters(subpatches.i[n], side, column), parameters(subpatches.j[n], side, row)
+        by_u, by_v, at = basis(u), basis(v), 4 * POINTS * patch
+        scale = ONE / restrict(screen, at + 2 * POINTS, by_u, by_v)
+        x, y = restrict(screen, at, by_u, by_v) * scale, restrict(screen, at + POINTS, by_u, by_v) * scale
+        z, color = restrict(screen, at + 3 * POINTS, by_u, by_v) * scale, spread(UNSHADED)
         if shaded:
-            gather(nets, squares.patch, gathered[1], net)
-            evaluate(
-                net, grid.by_u, grid.by_v, grid.slope_u, grid.slope_v, grid.between, grid.point, grid.along_u,
-                grid.along_v,
-            )  # fmt: skip
-            if set_normals(grid.rows):
-                _borrow_normals(grid, net, squares, lanes, values)
-            shade(grid, light, texture, squares)
-        _store_grids(grid, first, lanes, vertices, boxes)
+            at = dimensions * POINTS * patch
+            slope_u, slope_v = slopes(u), slopes(v)
+            px = evaluate(nets, at, by_u, by_v, slope_u, slope_v)
+            py = evaluate(nets, at + POINTS, by_u, by_v, slope_u, slope_v)
+            pz = evaluate(nets, at + 2 * POINTS, by_u, by_v, slope_u, slope_v)
+            w, cells = spread(ONE), spread(light.squares)
+            if weighted:
+                weights = evaluate(nets, at + 3 * POINTS, by_u, by_v, slope_u, slope_v)
+                px, py, pz = tangents(px, weights), tangents(py, weights), tangents(pz, weights)
+                w, cells = weights[0], light.squares / weights[0]
+            nx, ny, nz, none = cross(px, py, pz)
+            normal, missing = (nx, ny, nz), bits(none)
+            if missing != np.uint64(0):
+                normal = _borrow(nets, at, dimensions, u, v, missing, normal, scratch, values)
+            point = (px[0], py[0], pz[0], w)
+            reflectance = checker(point, cells) if texture is None else texels(texture, u, v, scratch)
+            color = colored(reflectance, lit(point, normal, light))
+        store_vertices(vertices, 4 * POINTS * n, (x, y, z, color))
+        boxes[n, 0], boxes[n, 1] = least(x, first(x)), least(y, first(y))
+        boxes[n, 2], boxes[n, 3] = greatest(x, first(x)), greatest(y, first(y))
 
 
 def dice(
@@ -223,17 +197,7 @@ def dice(
     grids = Grids(vertices, np.empty((number, 4), np.float32))
     light = lighting(points, matrix)
     for_parts(
-        _dice,
-        parts_of(number, BLOCK),
-        GRID_SIDE,
-        LANES,
-        subpatches,
-        nets,
-        screen,
-        light,
-        texture,
-        shaded,
-        vertices,
-        grids.boxes,
-    )
+        _dice, parts_of(number, BLOCK), subpatches, nets.reshape(-1), dimensions == 4, screen.reshape(-1),
+        light, texture, shaded, vertices.reshape(-1), grids.boxes,
+    )  # fmt: skip
     return StageResult(grids, works)

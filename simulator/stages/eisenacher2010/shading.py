@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.kernel import kernel
-from tilestamp.simulator.stages.eisenacher2010.bezier import LANES
+from tilestamp.simulator.stages.eisenacher2010.bezier import POINTS
+from tilestamp.simulator.stages.vectors import floor, larger, load, rgba, root, select, size, smaller, store
 
 AMBIENT = np.float32(0.15)
 DIFFUSE = np.float32(0.75)
@@ -19,10 +20,9 @@ LAMP = (-0.5, 0.7, 1.0)  # right, up, towards the viewer
 LIGHT_SQUARE = (np.float32(0.92), np.float32(0.86), np.float32(0.74))
 DARK_SQUARE = (np.float32(0.72), np.float32(0.47), np.float32(0.33))
 CHECKERS = 10.0  # squares along the longest side of the model
-OPAQUE = np.uint32(0xFF000000)
 DEGENERATE = np.float32(1e-9)  # squared sine of the angle between tangents below which there is no normal
 NUDGE = np.float32(1 / 64)  # of the way to the middle of the patch, where a collapsed edge borrows its normal
-_ZERO, _ONE, _TWO, _HALF, _THREE = (np.float32(x) for x in (0, 1, 2, 0.5, 3))
+_ZERO, _ONE, _TWO, _HALF = (np.float32(x) for x in (0, 1, 2, 0.5))
 _BYTE = np.float32(255)
 
 
@@ -32,53 +32,6 @@ class Lighting(NamedTuple):
     lamp: NDArray[np.float32]  # (3,) unit vector towards the lamp
     eye: NDArray[np.float32]  # (4,) homogeneous; the last is 0 for a parallel projection
     squares: np.float32  # checker squares in a unit of length
-
-
-# Rows of 16 vertices of all lanes in one buffer: by one base and constant distances LLVM sees that they do not overlap.
-VERTICES = 16 * LANES  # vertex k of lane n is k * LANES + n
-SCREEN, POINT, ALONG_U, ALONG_V, NORMAL = (4 * VERTICES * row for row in range(5))  # 4 coordinates each, 3 of NORMAL
-MATT, GLOSS = 19 * VERTICES, 20 * VERTICES  # ambient and diffuse, and specular light
-COLOR = 21 * VERTICES  # red, green, blue reflectance; then the packed colour's bits in the first
-ROWS = 24 * VERTICES
-
-
-class Grid(NamedTuple):
-    """Scratch of the grids of all lanes: tables of their parameters, and rows of their vertices with views of some."""
-
-    by_u: NDArray[np.float32]  # (4, 4, LANES)
-    by_v: NDArray[np.float32]
-    slope_u: NDArray[np.float32]  # (3, 4, LANES)
-    slope_v: NDArray[np.float32]
-    between: NDArray[np.float32]  # (4, 4, LANES)
-    rows: NDArray[np.float32]  # (ROWS,)
-    words: NDArray[np.uint32]  # (ROWS,) its bits
-    box: NDArray[np.float32]  # (4, LANES) x0, y0, x1, y1
-    screen: NDArray[np.float32]  # (4, 16, LANES) x w, y w, w, z w
-    point: NDArray[np.float32]  # (4, 16, LANES) homogeneous, model space
-    along_u: NDArray[np.float32]  # (4, 16, LANES)
-    along_v: NDArray[np.float32]  # (4, 16, LANES)
-
-
-@kernel
-def new_grid(side: Any, lanes: Any) -> Any:
-    """Scratch for grids; w = 1 until a patch with weights writes it."""
-    rows = np.zeros(ROWS, np.float32)
-    rows[POINT + 3 * VERTICES : POINT + 4 * VERTICES] = 1
-    rows.view(np.uint32)[COLOR : COLOR + VERTICES] = OPAQUE
-    return Grid(
-        np.zeros(4 * side * lanes, np.float32),
-        np.zeros(4 * side * lanes, np.float32),
-        np.zeros(3 * side * lanes, np.float32),
-        np.zeros(3 * side * lanes, np.float32),
-        np.zeros(side * side * lanes, np.float32),
-        rows,
-        rows.view(np.uint32),
-        np.zeros(4 * lanes, np.float32),
-        rows[SCREEN : SCREEN + 4 * VERTICES],
-        rows[POINT : POINT + 4 * VERTICES],
-        rows[ALONG_U : ALONG_U + 4 * VERTICES],
-        rows[ALONG_V : ALONG_V + 4 * VERTICES],
-    )
 
 
 def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
@@ -107,120 +60,75 @@ def lighting(points: NDArray[np.float32], matrix: ArrayLike) -> Lighting:
     )
 
 
-@kernel(error_model="numpy", lent=True)
-def set_normals(s: Any) -> Any:
-    """Cross products of the tangents of x/w, y/w, z/w, up to a positive factor; how many vertices have none."""
-    missing = np.int32(0)
-    for k in range(VERTICES):
-        px, py, pz, w = s[POINT + k], s[POINT + VERTICES + k], s[POINT + 2 * VERTICES + k], s[POINT + 3 * VERTICES + k]
-        wu, wv = s[ALONG_U + 3 * VERTICES + k], s[ALONG_V + 3 * VERTICES + k]
-        ux, uy, uz = (
-            s[ALONG_U + k] * w - px * wu,
-            s[ALONG_U + VERTICES + k] * w - py * wu,
-            s[ALONG_U + 2 * VERTICES + k] * w - pz * wu,
-        )
-        vx, vy, vz = (
-            s[ALONG_V + k] * w - px * wv,
-            s[ALONG_V + VERTICES + k] * w - py * wv,
-            s[ALONG_V + 2 * VERTICES + k] * w - pz * wv,
-        )
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        most = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
-        none = nx * nx + ny * ny + nz * nz <= DEGENERATE * most
-        missing = np.int32(missing + none)
-        s[NORMAL + k], s[NORMAL + VERTICES + k], s[NORMAL + 2 * VERTICES + k] = nx, ny, nz
-        s[MATT + k] = _ZERO if none else _ONE  # until the light is set: whether there is a normal
-    return missing
+@kernel(error_model="numpy", lent=True, inline=True)
+def cross(x: Any, y: Any, z: Any) -> Any:
+    """Normals from a coordinate each and its derivatives along u and v, up to a positive factor; which are missing."""
+    nx, ny, nz = y[1] * z[2] - z[1] * y[2], z[1] * x[2] - x[1] * z[2], x[1] * y[2] - y[1] * x[2]
+    most = (x[1] * x[1] + y[1] * y[1] + z[1] * z[1]) * (x[2] * x[2] + y[2] * y[2] + z[2] * z[2])
+    return nx, ny, nz, nx * nx + ny * ny + nz * nz <= DEGENERATE * most
 
 
-@kernel(lent=True)
-def tangent(values: Any, along: Any) -> Any:
-    """Tangent of x/w, y/w, z/w up to a positive factor, from a point and its derivatives, a coordinate a row."""
-    w, dw = values[3, 0], values[3, along]
+@kernel(lent=True, inline=True)
+def tangents(x: Any, w: Any) -> Any:
+    """A coordinate, and the derivatives of x/w along u and v up to a positive factor."""
+    return x[0], x[1] * w[0] - x[0] * w[1], x[2] * w[0] - x[0] * w[2]
+
+
+@kernel(error_model="numpy", lent=True, inline=True)
+def lit(point: Any, normal: Any, light: Lighting) -> Any:
+    """Matt and glossy light of vertices; a normal turned away from the viewer is turned round."""
+    (px, py, pz, w), (nx, ny, nz), tiny = point, normal, np.float32(1e-30)
+    lamp, eye = light.lamp, light.eye
+    lx, ly, lz, ex, ey, ez, ew = lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3]
+    vx, vy, vz = ex * w - ew * px, ey * w - ew * py, ez * w - ew * pz
+    v_scale = _ONE / root(vx * vx + vy * vy + vz * vz + tiny)
+    n_scale = _ONE / root(nx * nx + ny * ny + nz * nz + tiny)
+    facing = (nx * vx + ny * vy + nz * vz) * (v_scale * n_scale)
+    straight = (nx * lx + ny * ly + nz * lz) * n_scale
+    straight = select(facing >= _ZERO, straight, -straight)
+    along = (lx * vx + ly * vy + lz * vz) * v_scale
+    mirrored = _TWO * straight * size(facing) - along  # reflected lamp . viewer
+    mirrored = select((mirrored > _ZERO) & (straight > _ZERO), mirrored, _ZERO)
+    for _ in range(5):
+        mirrored = mirrored * mirrored
+    return AMBIENT + DIFFUSE * larger(straight, _ZERO), SPECULAR * mirrored
+
+
+@kernel(error_model="numpy", lent=True, inline=True)
+def checker(point: Any, scale: Any) -> Any:
+    """Reflectances of a solid checker: ``scale`` takes a point to squares."""
+    cells = floor(point[0] * scale) + floor(point[1] * scale)
+    half = _HALF * (cells + floor(point[2] * scale))
+    odd = half != floor(half)
     return (
-        values[0, along] * w - values[0, 0] * dw,
-        values[1, along] * w - values[1, 0] * dw,
-        values[2, along] * w - values[2, 0] * dw,
+        select(odd, LIGHT_SQUARE[0], DARK_SQUARE[0]),
+        select(odd, LIGHT_SQUARE[1], DARK_SQUARE[1]),
+        select(odd, LIGHT_SQUARE[2], DARK_SQUARE[2]),
     )
 
 
 @kernel(error_model="numpy", lent=True)
-def _set_light(s: Any, lx: Any, ly: Any, lz: Any, ex: Any, ey: Any, ez: Any, ew: Any) -> None:
-    """Matt and glossy light by vertex; a normal turned away from the viewer is turned round."""
-    tiny = np.float32(1e-30)
-    for k in range(VERTICES):
-        w = s[POINT + 3 * VERTICES + k]
-        vx, vy, vz = (
-            ex * w - ew * s[POINT + k],
-            ey * w - ew * s[POINT + VERTICES + k],
-            ez * w - ew * s[POINT + 2 * VERTICES + k],
-        )
-        nx, ny, nz = s[NORMAL + k], s[NORMAL + VERTICES + k], s[NORMAL + 2 * VERTICES + k]
-        v_scale = _ONE / np.sqrt(vx * vx + vy * vy + vz * vz + tiny)
-        n_scale = _ONE / np.sqrt(nx * nx + ny * ny + nz * nz + tiny)
-        facing = (nx * vx + ny * vy + nz * vz) * (v_scale * n_scale)
-        lit = (nx * lx + ny * ly + nz * lz) * n_scale
-        lit = lit if facing >= _ZERO else -lit
-        along = (lx * vx + ly * vy + lz * vz) * v_scale
-        mirrored = _TWO * lit * abs(facing) - along  # reflected lamp . viewer
-        mirrored = mirrored if mirrored > _ZERO and lit > _ZERO else _ZERO
-        mirrored *= mirrored
-        mirrored *= mirrored
-        mirrored *= mirrored
-        mirrored *= mirrored
-        mirrored *= mirrored
-        s[MATT + k] = AMBIENT + DIFFUSE * max(lit, _ZERO)
-        s[GLOSS + k] = SPECULAR * mirrored
-
-
-@kernel(error_model="numpy", lent=True)
-def _set_checker(s: Any, squares: Any) -> None:
-    """Reflectances of a solid checker."""
-    for k in range(VERTICES):
-        scale = squares / s[POINT + 3 * VERTICES + k]
-        cells = np.floor(s[POINT + k] * scale) + np.floor(s[POINT + VERTICES + k] * scale)
-        half = _HALF * (cells + np.floor(s[POINT + 2 * VERTICES + k] * scale))
-        odd = half != np.floor(half)
-        s[COLOR + k] = LIGHT_SQUARE[0] if odd else DARK_SQUARE[0]
-        s[COLOR + VERTICES + k] = LIGHT_SQUARE[1] if odd else DARK_SQUARE[1]
-        s[COLOR + 2 * VERTICES + k] = LIGHT_SQUARE[2] if odd else DARK_SQUARE[2]
-
-
-@kernel(error_model="numpy", lent=True)
-def _set_texels(s: Any, texture: Any, squares: Any) -> None:
-    """Reflectances from the texels at (u, v) of the patch, v down the rows."""
-    for at in range(VERTICES):
-        n, k = at % LANES, at // LANES
-        u = np.float32(3 * squares.i[n] + (k & 3)) * squares.side[n] / _THREE
-        v = np.float32(3 * squares.j[n] + (k >> 2)) * squares.side[n] / _THREE
-        row = min(np.int64(v * np.float32(texture.shape[0])), texture.shape[0] - 1)
-        column = min(np.int64(u * np.float32(texture.shape[1])), texture.shape[1] - 1)
+def texels(texture: Any, u: Any, v: Any, scratch: Any) -> Any:
+    """Reflectances from the texels at (u, v) of the patch, v down the rows; ``scratch``, five rows of 16."""
+    store(scratch, 0, u)
+    store(scratch, POINTS, v)
+    for k in range(POINTS):
+        row = min(np.int64(scratch[POINTS + k] * np.float32(texture.shape[0])), texture.shape[0] - 1)
+        column = min(np.int64(scratch[k] * np.float32(texture.shape[1])), texture.shape[1] - 1)
         for channel in range(3):
-            s[COLOR + VERTICES * channel + at] = np.float32(texture[row, column, channel]) / _BYTE
+            scratch[(2 + channel) * POINTS + k] = np.float32(texture[row, column, channel]) / _BYTE
+    return load(scratch, 2 * POINTS), load(scratch, 3 * POINTS), load(scratch, 4 * POINTS)
 
 
-@kernel(lent=True)
-def _level(s: Any, channel: int, k: int) -> Any:
+@kernel(lent=True, inline=True)
+def _level(reflectance: Any, matt: Any, gloss: Any) -> Any:
     """Light a reflectance: from 0 to 255."""
-    level = s[COLOR + channel * VERTICES + k] * s[MATT + k] + s[GLOSS + k]
-    return np.uint32(min(level, _ONE) * _BYTE + _HALF)
+    return smaller(reflectance * matt + gloss, _ONE) * _BYTE + _HALF
 
 
-@kernel(lent=True)
-def _set_colors(s: Any, words: Any) -> None:
-    """Light the reflectances, and pack them in the place of the first: RGBA8, red lowest."""
-    for k in range(VERTICES):
-        red, green, blue = _level(s, 0, k), _level(s, 1, k), _level(s, 2, k)
-        words[COLOR + k] = red | green << np.uint32(8) | blue << np.uint32(16) | OPAQUE
-
-
-@kernel(lent=True)
-def shade(grid: Grid, light: Lighting, texture: Any, squares: Any) -> None:
-    """Set the colours of grids with normals."""
-    s, lamp, eye = grid.rows, light.lamp, light.eye
-    _set_light(s, lamp[0], lamp[1], lamp[2], eye[0], eye[1], eye[2], eye[3])
-    if texture is None:
-        _set_checker(s, light.squares)
-    else:
-        _set_texels(s, texture, squares)
-    _set_colors(s, grid.words)
+@kernel(lent=True, inline=True)
+def colored(reflectance: Any, light: Any) -> Any:
+    """Light reflectances, red, green and blue, and pack them."""
+    matt, gloss = light
+    red, green, blue = reflectance
+    return rgba(_level(red, matt, gloss), _level(green, matt, gloss), _level(blue, matt, gloss))
