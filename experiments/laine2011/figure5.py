@@ -40,16 +40,9 @@ def run(progress: Progress) -> Result:
         made, triangles = draw(area)
         for stage, ns in nanoseconds(made, triangles).items():
             asked = published_ns()[area, stage]
+            frame = frame_name(area)
             cells.append(
-                Cell(
-                    f"{area:g} px",
-                    stage,
-                    "ns/triangle",
-                    published=asked,
-                    ours=ns,
-                    aim=WORST_AIM,
-                    frame=frame_name(area),
-                )
+                Cell(f"{area:g} px", stage, "ns/triangle", published=asked, ours=ns, aim=WORST_AIM, frame=frame)
             )
             rows.append(
                 {

@@ -67,14 +67,10 @@ def time_cell(scene: str, name: str, label: str, samples: int) -> Cell:
     rows = log[(log["table"] == "table2") & (log["renderer"] == "CudaRaster") & (log["scene"] == scene)]
     asked = rows.loc[(rows["key"] == label) & (rows["column"] == f"msaa{samples}_ms"), "value"]
     made = draw(name, "cudaraster", WIDTH, HEIGHT, mode=MODES[label], msaa=samples)
+    column = f"{samples} samples"
+    frame = frame_name(name)
     return Cell(
-        f"{scene}, {label}",
-        f"{samples} samples",
-        "ms",
-        published=float(asked.iloc[0]),
-        ours=made.milliseconds,
-        aim=AIM,
-        frame=frame_name(name),
+        f"{scene}, {label}", column, "ms", published=float(asked.iloc[0]), ours=made.milliseconds, aim=AIM, frame=frame
     )
 
 

@@ -52,13 +52,9 @@ def run(progress: Progress) -> Result:
     ]
     if name is None:
         warning = f"neither {FULL} nor {REDUCED} is on the scene search path (TILESTAMP_SCENES): nothing was drawn"
+        warnings = [warning]
         return Result(
-            name="laine2011-table3",
-            title="Table 3: Buddha",
-            source=SOURCE,
-            cells=[],
-            notes=notes,
-            warnings=[warning],
+            name="laine2011-table3", title="Table 3: Buddha", source=SOURCE, cells=[], notes=notes, warnings=warnings
         )
     progress(f"laine2011/table3: {name}")
     made = simulate(load_buddha(name), "cudaraster", MACHINE, width=WIDTH, height=HEIGHT, camera=CAMERA)

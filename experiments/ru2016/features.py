@@ -62,14 +62,11 @@ def run(progress: Callable[[str], None]) -> Result:
         said = "no" if same else "yes"
         cells.append(Cell("all models", "ssao: cost depends on the scene", "", published="no", ours=said, of=made_of))
     notes = _notes(costs, speed)
+    title = "Filtering and ambient occlusion"
+    answer = _answer(cells)
+    warnings = missing(absent)
     return Result(
-        name="ru2016-features",
-        title="Filtering and ambient occlusion",
-        source=SOURCE,
-        cells=cells,
-        answer=_answer(cells),
-        notes=notes,
-        warnings=missing(absent),
+        name="ru2016-features", title=title, source=SOURCE, cells=cells, answer=answer, notes=notes, warnings=warnings
     )
 
 

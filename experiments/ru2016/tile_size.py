@@ -45,17 +45,8 @@ def run(progress: Callable[[str], None]) -> Result:
     rows: list[Cell] = []
     asked = dict(zip(table.tile_size, table.ms, strict=True))
     for tile, frame in times.items():
-        rows.append(
-            Cell(
-                f"{tile}x{tile}",
-                "time",
-                "ms",
-                published=float(asked[tile]),
-                ours=frame_ms(frame),
-                aim=0.2,
-                frame=PLACE,
-            )
-        )
+        ours = frame_ms(frame)
+        rows.append(Cell(f"{tile}x{tile}", "time", "ms", published=float(asked[tile]), ours=ours, aim=0.2, frame=PLACE))
     if rows:
         order = " < ".join(str(tile) for tile in sorted(times, key=lambda tile: frame_ms(times[tile])))
         made_of = tuple((cell.row, cell.column) for cell in rows)

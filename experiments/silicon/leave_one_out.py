@@ -60,15 +60,9 @@ def run(progress: Callable[[str], None]) -> Result:
             for row in left:
                 label = f"{scene} {row['W']}"
                 ours = _disassembled(kernel, row) + float(row["counts"] @ costs)
+                published = row["instructions"]
                 cells.append(
-                    Cell(
-                        label,
-                        f"{kernel} instructions",
-                        "",
-                        published=row["instructions"],
-                        ours=ours,
-                        aim=AIM_INSTRUCTIONS,
-                    )
+                    Cell(label, f"{kernel} instructions", "", published=published, ours=ours, aim=AIM_INSTRUCTIONS)
                 )
                 if row["us"] > SHORTEST_US:
                     cells.append(
@@ -78,13 +72,9 @@ def run(progress: Callable[[str], None]) -> Result:
         cells += tiled_cells(progress)
     except MissingInputError as missing:
         left_out.append(str(missing))
+    title = "H200, one scene left out of the fit"
     return Result(
-        name="silicon-leave_one_out",
-        title="H200, one scene left out of the fit",
-        source=SOURCE,
-        cells=cells,
-        notes=_notes(cells),
-        warnings=left_out,
+        name="silicon-leave_one_out", title=title, source=SOURCE, cells=cells, notes=_notes(cells), warnings=left_out
     )
 
 

@@ -72,16 +72,8 @@ def run(progress: Progress) -> Result:
         for name, unit, column in (("frame", "ms", "ms"), ("error", "steps of a byte", "rms"))
     ]
     figures = [Figure("frontier", partial(_draw, table, title))]
-    return finding(
-        "frontier",
-        title,
-        cells,
-        figures,
-        notes(table, chance),
-        {"points": table, "stochastic": chance},
-        _missing(scenes),
-        folder="splats",
-    )
+    tables = {"points": table, "stochastic": chance}
+    return finding("frontier", title, cells, figures, notes(table, chance), tables, _missing(scenes), folder="splats")
 
 
 def levels() -> dict[str, Scene]:

@@ -72,18 +72,11 @@ def run(progress: Progress) -> Result:
         )
         for depth in DEPTHS[:-1]
     ]
-    boundaries.append(
-        Boundary(
-            f"micropolygon, at most {MAX_DEPTH} halvings",
-            "distance of the eye from the surface",
-            "patch sides",
-            holds,
-            breaks,
-            f"sub-patches are dropped: {_holes(rows)}",
-            f"cull sub-patches wholly nearer than {NEAR:g} sides (near)",
-            _cost(holds),
-        )
-    )
+    method = f"micropolygon, at most {MAX_DEPTH} halvings"
+    parameter = "distance of the eye from the surface"
+    wrong = f"sub-patches are dropped: {_holes(rows)}"
+    cure = f"cull sub-patches wholly nearer than {NEAR:g} sides (near)"
+    boundaries.append(Boundary(method, parameter, "patch sides", holds, breaks, wrong, cure, _cost(holds)))
     boundaries.append(Boundary(f"micropolygon with near {NEAR:g}", "distance", "patch sides", *with_near, "dropped"))
     table = pd.DataFrame({"pass": range(1, len(passes) + 1), "sub-patches": passes})
     growth = int(passes[-2] - passes[-3])
@@ -95,14 +88,8 @@ def run(progress: Progress) -> Result:
         Figure("queue", _draw_queue),
         Figure("depth", lambda path: _draw_depth(pd.DataFrame([(d, f[1]) for d, f in found.items()]), path)),
     ]
-    return atlas_result(
-        "stability/eye_plane",
-        "Patches across the eye's plane",
-        boundaries,
-        figures,
-        notes,
-        {"distances": rows, "queue_at_the_end": table},
-    )
+    tables = {"distances": rows, "queue_at_the_end": table}
+    return atlas_result("stability/eye_plane", "Patches across the eye's plane", boundaries, figures, notes, tables)
 
 
 def _row(distance: float, near: float) -> dict[str, float]:

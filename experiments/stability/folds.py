@@ -126,15 +126,11 @@ def _draw_maps(table: pd.DataFrame, path: Path) -> None:
 def _boundary(turn: float, kind: MaskKind) -> Boundary:
     worst = max(wrong_share(fold, turn, kind) for fold in FOLDS)
     plain, deep = (milliseconds([masked(0, turn, k)[1]], MACHINE, "bit-mask") for k in ("plain", "depth"))
-    return Boundary(
-        f"bit mask ({kind}), turned by {turn:g} degrees",
-        "fold",
-        "degrees",
-        *boundary(turn, kind),
-        f"up to {100 * worst:.0f} % of the covered pixels show the wrong side",
-        "a mask that looks at depth" if kind == "plain" else "",
-        f"{deep:.4g} ms instead of {plain:.4g} for the flat patch on {MACHINE}" if kind == "plain" else "",
-    )
+    method = f"bit mask ({kind}), turned by {turn:g} degrees"
+    wrong = f"up to {100 * worst:.0f} % of the covered pixels show the wrong side"
+    cure = "a mask that looks at depth" if kind == "plain" else ""
+    cost = f"{deep:.4g} ms instead of {plain:.4g} for the flat patch on {MACHINE}" if kind == "plain" else ""
+    return Boundary(method, "fold", "degrees", *boundary(turn, kind), wrong, cure, cost)
 
 
 def _notes() -> list[str]:

@@ -50,28 +50,18 @@ def run(progress: Progress) -> Result:
         rows += [{"pipeline": pipeline, "area": area, "ms": milliseconds(pipeline, area)} for area in AREAS]
     table = pd.DataFrame(rows)
     boundaries = [_boundary(rival) for rival in PIPELINES[1:]]
-    return atlas_result(
-        "stability/huge_triangle",
-        "One huge triangle under FreePipe",
-        boundaries,
-        [Figure("time", lambda path: _plot(table, path))],
-        _notes(),
-        {"areas": table},
-    )
+    title = "One huge triangle under FreePipe"
+    figures = [Figure("time", lambda path: _plot(table, path))]
+    return atlas_result("stability/huge_triangle", title, boundaries, figures, _notes(), {"areas": table})
 
 
 def _boundary(rival: str) -> Boundary:
     small, large = AREAS[0], AREAS[-1]
     slow, fast = milliseconds("freepipe", large), milliseconds(rival, large)
-    return Boundary(
-        f"freepipe against {rival}",
-        "area of one triangle",
-        "pixels",
-        *overtaken(rival),
-        f"one thread scans it: at {large:g} pixels {slow:.4g} ms, {slow / fast:.0f} times {rival}'s",
-        f"draw it by {rival}",
-        f"{milliseconds(rival, small) - milliseconds('freepipe', small):+.4f} ms for a triangle of {small:g} pixels",
-    )
+    method = f"freepipe against {rival}"
+    wrong = f"one thread scans it: at {large:g} pixels {slow:.4g} ms, {slow / fast:.0f} times {rival}'s"
+    cost = f"{milliseconds(rival, small) - milliseconds('freepipe', small):+.4f} ms for a triangle of {small:g} pixels"
+    return Boundary(method, "area of one triangle", "pixels", *overtaken(rival), wrong, f"draw it by {rival}", cost)
 
 
 def _notes() -> list[str]:

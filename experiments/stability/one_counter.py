@@ -81,15 +81,11 @@ def _boundary(machine: str, variant: str) -> Boundary:
     even, crowd = address_ms(0.0, machine, variant), address_ms(1.0, machine, variant)
     plain = address_ms(0.0, machine, "as published")
     published = variant == "as published"
-    return Boundary(
-        f"address calculation on {machine}, {variant}",
-        "share of patches in one tile",
-        "",
-        *boundary(machine, variant),
-        f"atomics queue at one address: {crowd:.4g} ms with all patches in one tile, {even:.4g} ms without a crowd",
-        "one atomic for all lanes of a warp that want a counter" if published else "",
-        f"{address_ms(0.0, machine, 'one atomic a warp') - plain:+.4f} ms without a crowd" if published else "",
-    )
+    method = f"address calculation on {machine}, {variant}"
+    wrong = f"atomics queue at one address: {crowd:.4g} ms with all patches in one tile, {even:.4g} ms without a crowd"
+    cure = "one atomic for all lanes of a warp that want a counter" if published else ""
+    cost = f"{address_ms(0.0, machine, 'one atomic a warp') - plain:+.4f} ms without a crowd" if published else ""
+    return Boundary(method, "share of patches in one tile", "", *boundary(machine, variant), wrong, cure, cost)
 
 
 def _notes() -> list[str]:

@@ -58,12 +58,7 @@ def run(progress: Progress) -> Result:
 
 def _boundary(name: str) -> Boundary:
     machine = load_machine(name)
-    return Boundary(
-        f"binned on {name}",
-        "triangles",
-        "",
-        *boundary(machine),
-        "the launch is refused: nothing is drawn",
-        "three launches in place of two grid synchronisations",
-        f"{2 * machine.launch.stream_us:.3g} us for two more launches in a stream",
-    )
+    wrong = "the launch is refused: nothing is drawn"
+    cure = "three launches in place of two grid synchronisations"
+    cost = f"{2 * machine.launch.stream_us:.3g} us for two more launches in a stream"
+    return Boundary(f"binned on {name}", "triangles", "", *boundary(machine), wrong, cure, cost)

@@ -110,16 +110,9 @@ def _boundary(queue: str) -> Boundary:
     holds, breaks = boundary(queue)
     what = "triangles clipped by all planes" if queue == "sub-triangles" else "triangles over the whole screen"
     cost = "" if breaks is None else _cost(queue, int(breaks))
-    return Boundary(
-        f"cudaraster, {queue} at {SIZE}x{SIZE}",
-        what,
-        "",
-        holds,
-        breaks,
-        "the queue is too small for the first attempt; nothing is lost",
-        "draw again with more room" if cost else "",
-        cost,
-    )
+    wrong = "the queue is too small for the first attempt; nothing is lost"
+    cure = "draw again with more room" if cost else ""
+    return Boundary(f"cudaraster, {queue} at {SIZE}x{SIZE}", what, "", holds, breaks, wrong, cure, cost)
 
 
 def _cost(queue: str, count: int) -> str:

@@ -83,13 +83,8 @@ def run(progress: Callable[[str], None]) -> Result:
     scene = bunny()
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
-        return Result(
-            name="zhang2025-graph",
-            title="Stream against graph",
-            source=SOURCE,
-            cells=[],
-            warnings=[warning],
-        )
+        warnings = [warning]
+        return Result(name="zhang2025-graph", title="Stream against graph", source=SOURCE, cells=[], warnings=warnings)
     machine = load_machine(MACHINE)
     progress(MACHINE)
     *frame, last = nodes(draw(scene, MACHINE))

@@ -71,14 +71,10 @@ def run(progress: Callable[[str], None]) -> Result:
     best = min(errors, key=lambda name: errors[name])
     stated = ", ".join(f"{name} a factor {error:.2f}" for name, error in errors.items())
     notes.append(f"Mean miss of a kernel (geometric): {stated}. {best} fits better.")
+    title = "Ten kernels before and after"
+    answer = _answer(cells, best)
     return Result(
-        name="zhang2025-kernels",
-        title="Ten kernels before and after",
-        source=SOURCE,
-        cells=cells,
-        answer=_answer(cells, best),
-        figures=[FIGURE],
-        notes=notes,
+        name="zhang2025-kernels", title=title, source=SOURCE, cells=cells, answer=answer, figures=[FIGURE], notes=notes
     )
 
 

@@ -41,12 +41,9 @@ def run(progress: Callable[[str], None]) -> Result:
     try:
         scene = load_scene(SCENE)
     except TilestampError as error:
+        warnings = [str(error)]
         return Result(
-            name="zhang2025-pictures",
-            title="Features off and on",
-            source=source,
-            cells=[],
-            warnings=[str(error)],
+            name="zhang2025-pictures", title="Features off and on", source=source, cells=[], warnings=warnings
         )
     matrix = CAMERA.matrix(SIZE, SIZE)
     cells, figures = [], []
