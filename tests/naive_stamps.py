@@ -18,15 +18,8 @@ def stamps(polygons, width, height, offsets, shape, simt):
         tally["POLYGONS"] += 1
         side = shape[3]
         if not side:
-            _stamps_in(
-                tally,
-                polygon,
-                naive_ste.box_stamps(polygon, width, height, *shape[:2]),
-                (width, height),
-                offsets,
-                shape,
-                simt,
-            )
+            looked = naive_ste.box_stamps(polygon, width, height, *shape[:2])
+            _stamps_in(tally, polygon, looked, (width, height), offsets, shape, simt)
             continue
         coarse = naive_ste.box_stamps(polygon, width, height, side, side)
         tally += Counter(COARSE_STAMPS=len(coarse), COARSE_WARPS=-(-len(coarse) // WARP))

@@ -33,12 +33,9 @@ def visit(browser, address):
     contexts = []
 
     def open_page(width=WIDE, scheme="light", **options):
+        viewport = {"width": width, "height": 900}
         context = browser.new_context(
-            viewport={"width": width, "height": 900},
-            color_scheme=scheme,
-            offline=True,
-            reduced_motion="reduce",
-            **options,
+            viewport=viewport, color_scheme=scheme, offline=True, reduced_motion="reduce", **options
         )
         contexts.append(context)
         page = context.new_page()

@@ -63,15 +63,8 @@ def test_sixteen_blocks_take_as_long_as_132():
 def test_one_block_more_than_the_sms_hold_at_a_time_takes_twice_as_long():
     """One block of 20 warps and 48 KB an SM: 15 run together on a GTX 480, the 16th after them."""
     machine = load_machine("gtx480")
-    full = Launch(
-        stage="fine",
-        kernel="k",
-        grid=15,
-        block=640,
-        registers=48,
-        shared_bytes=48384,
-        events=np.full((15, EVENTS), 1000.0),
-    )
+    events = np.full((15, EVENTS), 1000.0)
+    full = Launch(stage="fine", kernel="k", grid=15, block=640, registers=48, shared_bytes=48384, events=events)
     more = replace(full, grid=16, events=np.full((16, EVENTS), 1000.0))
     ratio = work_cycles(schedule(more, machine, NOTHING)) / work_cycles(schedule(full, machine, NOTHING))
     assert ratio == pytest.approx(2, rel=0.02)

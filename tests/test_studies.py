@@ -160,11 +160,8 @@ def test_a_name_that_no_cell_has_is_refused_with_the_nearest_one():
 
 
 def test_what_only_one_pipeline_has_is_missing_in_the_rows_of_the_other():
-    study = Study(
-        fixed={**TINY, "machine": "gtx480"},
-        grid={"pipeline": ["micropolygon", "hardware"]},
-        record=["tile_raster.ste"],
-    )
+    fixed = {**TINY, "machine": "gtx480"}
+    study = Study(fixed=fixed, grid={"pipeline": ["micropolygon", "hardware"]}, record=["tile_raster.ste"])
     study.run(jobs=1)
     assert study.table()["tile_raster.ste"].notna().tolist() == [True, False]
 

@@ -21,11 +21,8 @@ def run():
 
 @pytest.fixture(scope="module")
 def study():
-    design = Study(
-        title="tiles",
-        fixed={"scene": "teapot", "size": "64x48", "machine": "gtx280"},
-        grid={"tile": [4, 8], "times.sm.clock_mhz": [0.5, 1.0, 2.0]},
-    )
+    fixed = {"scene": "teapot", "size": "64x48", "machine": "gtx280"}
+    design = Study(title="tiles", fixed=fixed, grid={"tile": [4, 8], "times.sm.clock_mhz": [0.5, 1.0, 2.0]})
     design.run(jobs=1)
     return design
 

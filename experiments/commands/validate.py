@@ -54,12 +54,8 @@ def validate(
         [r.kernel, str(r.spp or ""), r.quantity, str(r.cells), f"{r['mean']:.3f}", f"{r.worst:.3f}"]
         for _, r in by_kernel(table).iterrows()
     ]
-    print_table(
-        f"Model against machine ({model.name})",
-        ["kernel", "spp", "quantity", "cells", "mean", "worst"],
-        rows,
-        [""] * len(rows),
-    )
+    columns = ["kernel", "spp", "quantity", "cells", "mean", "worst"]
+    print_table(f"Model against machine ({model.name})", columns, rows, [""] * len(rows))
     for remark in remarks:
         sys.stdout.write(f"! {remark}\n")
     tiles = fastest_tiles(table)

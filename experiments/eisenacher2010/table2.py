@@ -26,13 +26,7 @@ def run(progress: Progress) -> Result:
                 written = made.frame.facts["patches_written"]
                 cells.append(
                     Cell(
-                        row,
-                        "patches",
-                        "",
-                        published=line.patches_rasterized,
-                        ours=written,
-                        aim=COUNT_AIM,
-                        frame=place,
+                        row, "patches", "", published=line.patches_rasterized, ours=written, aim=COUNT_AIM, frame=place
                     )
                 )
             ours = made.milliseconds + overhead_ms(made)

@@ -123,14 +123,10 @@ def _grid() -> Iterator[tuple[Subject, list[Variant]]]:
 
 
 def _run(subject: Subject, variant: Variant, machine: str) -> Run:
+    height = subject.height
+    camera = subject.matrix
     return simulate(
-        subject.scene,
-        variant.pipeline,
-        machine,
-        width=subject.width,
-        height=subject.height,
-        camera=subject.matrix,
-        **variant.options,
+        subject.scene, variant.pipeline, machine, width=subject.width, height=height, camera=camera, **variant.options
     )
 
 

@@ -21,13 +21,10 @@ OF_A_CELL = [field.name for field in fields(Cell)]
 
 def record_of(result: Result, folder: Path, stand_ins: dict[str, str], seconds: float) -> dict[str, Any]:
     """All that is said about a result whose plots and tables lie in ``folder``."""
+    answer = answered(result)
+    state = NOT_RUN if result.warnings and not result.cells else "done"
     row = row_of(
-        result,
-        name=folder.name,
-        question=question(result.experiment),
-        answer=answered(result),
-        state=NOT_RUN if result.warnings and not result.cells else "done",
-        seconds=seconds,
+        result, name=folder.name, question=question(result.experiment), answer=answer, state=state, seconds=seconds
     )
     return {
         "format": FORMAT,

@@ -51,8 +51,7 @@ def run(progress: Progress) -> Result:
         ),
     ]
     if name is None:
-        warning = f"neither {FULL} nor {REDUCED} is on the scene search path (TILESTAMP_SCENES): nothing was drawn"
-        warnings = [warning]
+        warnings = [f"neither {FULL} nor {REDUCED} is on the scene search path (TILESTAMP_SCENES): nothing was drawn"]
         return Result(
             name="laine2011-table3", title="Table 3: Buddha", source=SOURCE, cells=[], notes=notes, warnings=warnings
         )

@@ -34,14 +34,9 @@ def run(progress: Callable[[str], None]) -> Result:
     with TemporaryDirectory() as folder:
         left_out = write_inputs(Path(folder), unseen_scenes())
         widest = int(os.environ.get(WIDTH, "2048"))
+        inputs = Path(folder)
         executed = executions(
-            MEASURED,
-            load_machine("h200"),
-            progress,
-            inputs=Path(folder),
-            widest=widest,
-            guard_band=True,
-            left_out=left_out,
+            MEASURED, load_machine("h200"), progress, inputs=inputs, widest=widest, guard_band=True, left_out=left_out
         )
         table = compare(MEASURED, executed)
     walls = table[table.quantity == WALL].ours

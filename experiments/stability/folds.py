@@ -113,14 +113,9 @@ def _draw_maps(table: pd.DataFrame, path: Path) -> None:
         f"{kind} mask": table[table["mask"] == kind].pivot_table(index="turn", columns="fold", values="wrong")
         for kind in KINDS
     }
-    value_maps(
-        maps,
-        path,
-        title="Wrong pixels of a folded patch",
-        unit="share of covered pixels",
-        x_label="fold [degrees]",
-        y_label="turn [degrees]",
-    )
+    title = "Wrong pixels of a folded patch"
+    unit = "share of covered pixels"
+    value_maps(maps, path, title=title, unit=unit, x_label="fold [degrees]", y_label="turn [degrees]")
 
 
 def _boundary(turn: float, kind: MaskKind) -> Boundary:

@@ -26,15 +26,12 @@ def layered(layers: int, cells: int, seed: int = 0, opacity: float = 1.0) -> Sce
     triangles = np.concatenate([one + k * x.size for k in range(layers)]).astype(np.int32)
     colors = np.random.default_rng(1).uniform(0.2, 1.0, (layers, 4))
     colors[:, 3] = opacity
-    return Scene(
-        f"{layers} layers",
-        mesh=Mesh(
-            np.concatenate([positions, np.ones((len(positions), 1))], axis=1).astype(np.float32),
-            _shuffled(triangles, seed),
-            np.repeat(colors, x.size, axis=0).astype(np.float32),
-        ),
-        views={"default": VIEW},
+    mesh = Mesh(
+        np.concatenate([positions, np.ones((len(positions), 1))], axis=1).astype(np.float32),
+        _shuffled(triangles, seed),
+        np.repeat(colors, x.size, axis=0).astype(np.float32),
     )
+    return Scene(f"{layers} layers", mesh=mesh, views={"default": VIEW})
 
 
 def _shuffled(triangles: np.ndarray, seed: int) -> np.ndarray:

@@ -38,12 +38,7 @@ def run(progress: Callable[[str], None]) -> Result:
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
         return Result(
-            name="zhang2025-kernels",
-            title="Ten kernels",
-            source=SOURCE,
-            cells=[],
-            notes=notes,
-            warnings=[warning],
+            name="zhang2025-kernels", title="Ten kernels", source=SOURCE, cells=[], notes=notes, warnings=[warning]
         )
     cells: list[Cell] = []
     errors: dict[str, float] = {}

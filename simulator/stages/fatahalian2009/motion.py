@@ -191,14 +191,11 @@ def motion_work(
 
 def empty_work(kernel: str, simt: Simt) -> Work:
     """Launch of either algorithm, without rows."""
+    table = np.zeros((0, len(MotionEvent)), np.int64)
+    grid = blocks(simt, WARPS)
+    block = WARPS * simt.warp
     return Work(
-        stage=kernel,
-        kernel=kernel,
-        events=MotionEvent,
-        table=np.zeros((0, len(MotionEvent)), np.int64),
-        grid=blocks(simt, WARPS),
-        block=WARPS * simt.warp,
-        dispatch="warp_queue",
+        stage=kernel, kernel=kernel, events=MotionEvent, table=table, grid=grid, block=block, dispatch="warp_queue"
     )
 
 

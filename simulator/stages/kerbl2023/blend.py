@@ -215,12 +215,6 @@ def blend_work(table: NDArray[np.int64], tiles: Tiles, threads: int, count: int 
         Stream("colours", "load", 32 * fetches, 4 * COLOURS * used, span_bytes=span),
         Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * pixels),
     )
-    return Work(
-        "blend",
-        _E,
-        table,
-        threads,
-        shared_bytes=(SHARED_BYTES + BOX_BYTES * mask) * threads,
-        variant=f"tile {tiles.tile_x}x{tiles.tile_y}{several}{' mask' if mask else ''}",
-        streams=streams,
-    )
+    shared_bytes = (SHARED_BYTES + BOX_BYTES * mask) * threads
+    variant = f"tile {tiles.tile_x}x{tiles.tile_y}{several}{' mask' if mask else ''}"
+    return Work("blend", _E, table, threads, shared_bytes=shared_bytes, variant=variant, streams=streams)

@@ -276,12 +276,6 @@ def duplicate_work(table: NDArray[np.int64], bound: str, size: int) -> Work:
     ]  # fmt: skip
     if bound != "square":
         streams.append(Stream("conics", "load", 16 * visible, 16 * visible))
-    return Work(
-        "duplicate",
-        _E,
-        table,
-        BLOCK,
-        kernel="duplicate" if bound == "square" else "tight_duplicate",
-        streams=tuple(streams),
-        variant="" if bound == "square" else bound,
-    )
+    kernel = "duplicate" if bound == "square" else "tight_duplicate"
+    variant = "" if bound == "square" else bound
+    return Work("duplicate", _E, table, BLOCK, kernel=kernel, streams=tuple(streams), variant=variant)

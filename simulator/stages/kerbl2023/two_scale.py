@@ -181,13 +181,8 @@ def _work(table: NDArray[np.int64], tiles: Tiles, count: int, warp: int) -> Work
         *(Stream(name, "load", 32 * entries, size * used, span_bytes=span) for name, size in sizes),
         Stream("partials", "store", int(table[:, _E.STORE_BYTES].sum()), written),
     )
+    block = WARPS * warp
+    variant = f"tile {tiles.tile_x}x{tiles.tile_y}"
     return Work(
-        "blend",
-        _E,
-        table,
-        WARPS * warp,
-        kernel="blend_batches",
-        shared_bytes=SHARED_BYTES,
-        variant=f"tile {tiles.tile_x}x{tiles.tile_y}",
-        streams=streams,
+        "blend", _E, table, block, kernel="blend_batches", shared_bytes=SHARED_BYTES, variant=variant, streams=streams
     )

@@ -142,14 +142,10 @@ def raster_launch(
     events: NDArray[np.int64], tile: int, spp: int, variant: str, streams: tuple[Stream, ...] = ()
 ) -> Work:
     """A block a tile, a thread a pixel."""
+    block = tile * tile
+    shared_bytes = tile * tile * spp * SAMPLE_BYTES
     return Work(
-        "sample_raster",
-        SampleRasterEvent,
-        events,
-        tile * tile,
-        shared_bytes=tile * tile * spp * SAMPLE_BYTES,
-        streams=streams,
-        variant=variant,
+        "sample_raster", SampleRasterEvent, events, block, shared_bytes=shared_bytes, streams=streams, variant=variant
     )
 
 

@@ -119,14 +119,8 @@ def _works(
         for event in (MovingListEvent.LOAD_BYTES, MovingListEvent.STORE_BYTES, MovingListEvent.ATOMIC_REQUESTS)
     )
     counters = Stream("tile_counters", "atomic", 32 * asked, COUNTER_BYTES * tiles)
-    filling = Work(
-        "moving_lists",
-        MovingListEvent,
-        table,
-        BLOCK,
-        streams=(Stream("triangles", "load", loaded, footprint), counters),
-        atomic_requests=requests,
-    )
+    streams = (Stream("triangles", "load", loaded, footprint), counters)
+    filling = Work("moving_lists", MovingListEvent, table, BLOCK, streams=streams, atomic_requests=requests)
     counted = table.copy()
     counted[:, [MovingListEvent.STORE_TRANSACTIONS, MovingListEvent.STORE_BYTES]] = 0
     appended = ENTRY_BYTES * int(table[:, MovingListEvent.APPEND_LANES].sum())

@@ -203,15 +203,9 @@ def pixel_shader(
         ),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
+    variant = "" if derivatives == "quads" else derivatives
     work = Work(
-        "PixelShader",
-        PixelShaderEvent,
-        events,
-        BLOCK,
-        kernel=kernel,
-        grid=blocks,
-        streams=streams,
-        variant="" if derivatives == "quads" else derivatives,
+        "PixelShader", PixelShaderEvent, events, BLOCK, kernel=kernel, grid=blocks, streams=streams, variant=variant
     )
     return StageResult(stream, (work,))
 
