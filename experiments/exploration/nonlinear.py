@@ -73,16 +73,13 @@ def run(progress: Progress) -> Result:
                 drawn = draw(kind, side, method="tessellated", tolerance=tolerance, double=False)
                 rows.append(row | _row(f"chords within {tolerance:g} px", drawn, ids))
     table = pd.DataFrame(rows)
-    return Result(
-        name="exploration-nonlinear",
-        title="Non-linear projections: a line of sight a sample against tessellation",
-        source=SOURCE,
-        cells=_cells(table),
-        answer=_answer(table),
-        figures=_figures(table, pictures),
-        notes=_notes(table),
-        tables={"runs": table},
-    )
+    title = "Non-linear projections: a line of sight a sample against tessellation"
+    cells = _cells(table)
+    answer = _answer(table)
+    figures = _figures(table, pictures)
+    notes = _notes(table)
+    tables = {"runs": table}
+    return Result("exploration-nonlinear", title, SOURCE, cells, answer, figures=figures, notes=notes, tables=tables)
 
 
 def _row(method: str, drawn: Run, right: NDArray[np.int32] | None) -> dict[str, Any]:

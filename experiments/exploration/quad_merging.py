@@ -93,15 +93,13 @@ def run(progress: Progress) -> Result:
     table, by_entries = pd.DataFrame(rows), pd.DataFrame(buffers)
     progress("a model's frame")
     frames = _frames()
+    title = "Quad merging: pixels shaded by triangle area, and by the buffer that merges quads"
+    answer = _answer(table, by_entries)
+    figures = _figures(table, by_entries)
+    notes = _notes(by_entries, frames)
+    tables = {"areas": table, "buffers": by_entries, "frames": frames}
     return Result(
-        name="exploration-quad_merging",
-        title="Quad merging: pixels shaded by triangle area, and by the buffer that merges quads",
-        source=SOURCE,
-        cells=_cells(table),
-        answer=_answer(table, by_entries),
-        figures=_figures(table, by_entries),
-        notes=_notes(by_entries, frames),
-        tables={"areas": table, "buffers": by_entries, "frames": frames},
+        "exploration-quad_merging", title, SOURCE, _cells(table), answer, figures=figures, notes=notes, tables=tables
     )
 
 

@@ -95,7 +95,7 @@ def _run(name: str, output: Path, options: dict[str, Any], say: Progress) -> Out
         try:
             result, used = run_judged(load_experiment(name), say)
         except MissingInputError as missing:
-            result = Result(name=name, title=describe(name), source="", cells=[], warnings=[f"not run: {missing}"])
+            result = Result(name, describe(name), "", [], warnings=[f"not run: {missing}"])
         result = replace(result, experiment=name)
         write_result(result, output, Making(options, used, made, time.perf_counter() - begin))
     except TilestampError as error:

@@ -76,7 +76,7 @@ def row_from(record: dict[str, Any], outdated: str = "") -> Row:
 def result_of(record: dict[str, Any]) -> Result:
     """The result again, but for its plots and tables."""
     kept = ("title", "source", "answer", "notes", "warnings", "experiment")
-    return Result(name=record["name"], cells=[_cell(cell) for cell in record["cells"]], **{k: record[k] for k in kept})
+    return Result(record["name"], cells=[_cell(cell) for cell in record["cells"]], **{k: record[k] for k in kept})
 
 
 def _cell(record: dict[str, Any]) -> Cell:

@@ -137,7 +137,7 @@ class Chart:
     of: "dict[str, Any]"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Result:
     """What one experiment found.
 
@@ -166,6 +166,7 @@ class Result:
     source: str
     cells: list[Cell]
     answer: str = ""
+    _: KW_ONLY
     figures: "Sequence[Figure | CellFigure]" = ()
     charts: "Sequence[Chart]" = ()
     notes: list[str] = field(default_factory=list)

@@ -32,21 +32,18 @@ def run(progress: Progress) -> Result:
                 {"area": area, "stage": stage, "ns": new[stage], "ratio": new[stage] / old[stage], "bound": bound}
             )
     table = pd.DataFrame(rows)
+    title = "The sweep on a GTX 680, by the mixes of the GTX 480"
+    answer = f"In {table['ratio'].min():.2f} to {table['ratio'].max():.2f} times a GTX 480's time, by stage."
+    figures = [Figure("ratio", lambda path: _draw(table, path))]
+    notes = [
+        (
+            "A prediction without a measured cell here: nothing is fitted to a GTX 680, and its machine file is "
+            "made of published parameters. Only the machine file differs; code compiled for 3.0 would differ too."
+        ),
+        "Stages that wait for dependent instructions have 8 SMs instead of 15, and shorter latencies on each.",
+    ]
     return Result(
-        name="laine2011-gtx680",
-        title="The sweep on a GTX 680, by the mixes of the GTX 480",
-        source=SOURCE,
-        cells=cells,
-        answer=f"In {table['ratio'].min():.2f} to {table['ratio'].max():.2f} times a GTX 480's time, by stage.",
-        figures=[Figure("ratio", lambda path: _draw(table, path))],
-        notes=[
-            (
-                "A prediction without a measured cell here: nothing is fitted to a GTX 680, and its machine file is "
-                "made of published parameters. Only the machine file differs; code compiled for 3.0 would differ too."
-            ),
-            "Stages that wait for dependent instructions have 8 SMs instead of 15, and shorter latencies on each.",
-        ],
-        tables={"sweep": table},
+        "laine2011-gtx680", title, SOURCE, cells, answer, figures=figures, notes=notes, tables={"sweep": table}
     )
 
 

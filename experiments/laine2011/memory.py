@@ -48,21 +48,15 @@ def run(progress: Progress) -> Result:
             cells += [
                 queue_cell(scene.name, queue, float(row[column]), used[queue]) for queue, column in QUEUES.items()
             ]
-    return Result(
-        name="laine2011-memory",
-        title="Slides: memory in use, CudaRaster, 1024x768",
-        source=SOURCE,
-        cells=cells,
-        answer=_answer(cells),
-        figures=[FIGURE],
-        notes=[
-            (
-                f"Queues: aim a factor {QUEUE_FACTOR}. The release has 16 bin streams, the slides speak of 15, one an "
-                "SM; each stream of each bin keeps an open segment of 2 KB at the end of each batch."
-            ),
-        ],
-        warnings=[warning()],
-    )
+    title = "Slides: memory in use, CudaRaster, 1024x768"
+    answer = _answer(cells)
+    notes = [
+        (
+            f"Queues: aim a factor {QUEUE_FACTOR}. The release has 16 bin streams, the slides speak of 15, one an "
+            "SM; each stream of each bin keeps an open segment of 2 KB at the end of each batch."
+        ),
+    ]
+    return Result("laine2011-memory", title, SOURCE, cells, answer, figures=[FIGURE], notes=notes, warnings=[warning()])
 
 
 def _answer(cells: Sequence[Cell]) -> str:

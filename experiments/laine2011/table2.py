@@ -26,23 +26,18 @@ def run(progress: Progress) -> Result:
             progress(f"laine2011/table2: {scene}, {label}")
             cells += [time_cell(scene, name, label, samples) for samples in SAMPLES]
     cells.append(emits_cell())
-    return Result(
-        name="laine2011-table2",
-        title="Table 2: samples a pixel, CudaRaster, 1024x768, GTX 480",
-        source=SOURCE,
-        cells=cells,
-        answer=_answer(cells),
-        figures=[time_bars("samples", lambda cell: cell.unit == "ms", "Samples a pixel")],
-        notes=[
-            (
-                "One number of all that several samples cost is fitted, on one cell: FairyForest, depth, no blend, 8 "
-                "samples. The rest of their mix is operations counted by hand; that of blending anew, after its error "
-                "had been seen."
-            ),
-            f"{len(modes())} of {len(MODES)} modes were drawn; {VARIABLE}=all draws all.",
-        ],
-        warnings=[warning()],
-    )
+    title = "Table 2: samples a pixel, CudaRaster, 1024x768, GTX 480"
+    answer = _answer(cells)
+    figures = [time_bars("samples", lambda cell: cell.unit == "ms", "Samples a pixel")]
+    notes = [
+        (
+            "One number of all that several samples cost is fitted, on one cell: FairyForest, depth, no blend, 8 "
+            "samples. The rest of their mix is operations counted by hand; that of blending anew, after its error "
+            "had been seen."
+        ),
+        f"{len(modes())} of {len(MODES)} modes were drawn; {VARIABLE}=all draws all.",
+    ]
+    return Result("laine2011-table2", title, SOURCE, cells, answer, figures=figures, notes=notes, warnings=[warning()])
 
 
 def _answer(cells: Sequence[Cell]) -> str:

@@ -52,9 +52,7 @@ def run(progress: Progress) -> Result:
     ]
     if name is None:
         warnings = [f"neither {FULL} nor {REDUCED} is on the scene search path (TILESTAMP_SCENES): nothing was drawn"]
-        return Result(
-            name="laine2011-table3", title="Table 3: Buddha", source=SOURCE, cells=[], notes=notes, warnings=warnings
-        )
+        return Result("laine2011-table3", "Table 3: Buddha", SOURCE, [], notes=notes, warnings=warnings)
     progress(f"laine2011/table3: {name}")
     made = simulate(load_buddha(name), "cudaraster", MACHINE, width=WIDTH, height=HEIGHT, camera=CAMERA)
     cells = counter_cells(made, "predicted" if name == FULL else "stand-in")

@@ -65,9 +65,7 @@ def run(progress: Callable[[str], None]) -> Result:
     title = "Filtering and ambient occlusion"
     answer = _answer(cells)
     warnings = missing(absent)
-    return Result(
-        name="ru2016-features", title=title, source=SOURCE, cells=cells, answer=answer, notes=notes, warnings=warnings
-    )
+    return Result("ru2016-features", title, SOURCE, cells, answer, notes=notes, warnings=warnings)
 
 
 def _answer(cells: list[Cell]) -> str:

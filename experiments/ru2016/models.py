@@ -63,16 +63,11 @@ def run(progress: Callable[[str], None]) -> Result:
     progress("the other view")
     tables = {"views": _views(), "breakdown": _breakdown(runs)}
     notes = [*_notes(runs, tables["breakdown"]), _view_note(cells, tables["views"], table)]
+    title = "Tiles against primitives"
+    answer = _answer(cells)
+    warnings = missing(absent)
     return Result(
-        name="ru2016-models",
-        title="Tiles against primitives",
-        source=SOURCE,
-        cells=cells,
-        answer=_answer(cells),
-        figures=[FIGURE],
-        notes=notes,
-        warnings=missing(absent),
-        tables=tables,
+        "ru2016-models", title, SOURCE, cells, answer, figures=[FIGURE], notes=notes, warnings=warnings, tables=tables
     )
 
 

@@ -55,15 +55,9 @@ def run(progress: Callable[[str], None]) -> Result:
         "left-out-scenes": scenes,
         "fastest-tile": tiles,
     }
+    title = "H200, model against machine"
     return Result(
-        name=NAME,
-        title="H200, model against machine",
-        source=SOURCE,
-        cells=_cells(table),
-        figures=_figures(table),
-        notes=notes,
-        warnings=left_out,
-        tables=tables,
+        NAME, title, SOURCE, _cells(table), figures=_figures(table), notes=notes, warnings=left_out, tables=tables
     )
 
 

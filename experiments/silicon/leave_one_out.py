@@ -73,9 +73,7 @@ def run(progress: Callable[[str], None]) -> Result:
     except MissingInputError as missing:
         left_out.append(str(missing))
     title = "H200, one scene left out of the fit"
-    return Result(
-        name="silicon-leave_one_out", title=title, source=SOURCE, cells=cells, notes=_notes(cells), warnings=left_out
-    )
+    return Result("silicon-leave_one_out", title, SOURCE, cells, notes=_notes(cells), warnings=left_out)
 
 
 def _rows(machine: Machine, say: Callable[[str], None], inputs: Path) -> Iterator[dict[str, Any]]:

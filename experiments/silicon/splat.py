@@ -43,33 +43,27 @@ def run(progress: Callable[[str], None]) -> Result:
             progress(f"{name} {measured.label}")
             found += [{"scene": name, "config": measured.label} | row for row in compared(measured)]
     if not found:
-        return Result(name=NAME, title=TITLE, source=SOURCE, cells=[], warnings=missing)
+        return Result(NAME, TITLE, SOURCE, [], warnings=missing)
     table = pd.DataFrame(found)
     tiles = fastest_tiles(table)
     clear = tiles[tiles.clear]
     right = f"Fastest tile: right in {int((clear.ours == clear.measured).sum())} of {len(clear)} clear cases (10 %)."
-    return Result(
-        name=NAME,
-        title=TITLE,
-        source=SOURCE,
-        cells=cells(table),
-        figures=[
-            Figure(
-                f"tiles-{name}",
-                partial(
-                    paired_bars,
-                    rows.assign(status="predicted", label=rows.config),
-                    title=f"Frames of {name} (H200)",
-                    unit="us",
-                    known="measured",
-                ),
-            )
-            for name, rows in _frames(table)
-        ],
-        notes=[right, *sentences(table)],
-        warnings=missing,
-        tables={"all": table, "kernels": by_kernel(table), "fastest-tile": tiles},
-    )
+    figures = [
+        Figure(
+            f"tiles-{name}",
+            partial(
+                paired_bars,
+                rows.assign(status="predicted", label=rows.config),
+                title=f"Frames of {name} (H200)",
+                unit="us",
+                known="measured",
+            ),
+        )
+        for name, rows in _frames(table)
+    ]
+    notes = [right, *sentences(table)]
+    tables = {"all": table, "kernels": by_kernel(table), "fastest-tile": tiles}
+    return Result(NAME, TITLE, SOURCE, cells(table), figures=figures, notes=notes, warnings=missing, tables=tables)
 
 
 TITLE = "H200, Gaussian splats, model against machine"

@@ -141,10 +141,10 @@ def compared(
     try:
         scenes = measured_scenes(system)
     except MissingInputError as missing:
-        return Result(name=name, title=title, source=source, cells=[], warnings=[str(missing)])
+        return Result(name, title, source, [], warnings=[str(missing)])
     table = pd.DataFrame([row for scene in scenes for row in rows_of(read_measured(scene))])
     tables = {"all": table, "kernels": by_kernel(table)}
-    return Result(name=name, title=title, source=source, cells=cells(table), notes=sentences(table), tables=tables)
+    return Result(name, title, source, cells(table), notes=sentences(table), tables=tables)
 
 
 def cells(table: pd.DataFrame) -> list[Cell]:

@@ -51,15 +51,8 @@ def run(progress: Callable[[str], None]) -> Result:
         *sentences(kernels),
     ]
     tables = {"all": table, "kernels": kernels, "scenes": by_scene(table), "fastest-tile": tiles}
-    return Result(
-        name="silicon-unseen",
-        title="H200, scenes that nothing was fitted to",
-        source=SOURCE,
-        cells=cells_of(table),
-        notes=notes,
-        warnings=left_out,
-        tables=tables,
-    )
+    title = "H200, scenes that nothing was fitted to"
+    return Result("silicon-unseen", title, SOURCE, cells_of(table), notes=notes, warnings=left_out, tables=tables)
 
 
 def all_times(table: pd.DataFrame) -> list[str]:

@@ -36,7 +36,7 @@ def run(progress: Progress) -> Result:
         try:
             scene = load_scene(f"garden{grid}")
         except TilestampError as missing:
-            return Result(name="splats-profile", title=TITLE, source=SOURCE, cells=[], warnings=[str(missing)])
+            return Result("splats-profile", TITLE, SOURCE, [], warnings=[str(missing)])
         frame = executed(scene, machine, width=WIDTH, height=HEIGHT, picture=False)
         milliseconds = frame_ms(frame)
         stages = ", ".join(f"{name} {ms:.2f}" for name, ms in frame.stages.milliseconds.items())
@@ -45,7 +45,7 @@ def run(progress: Progress) -> Result:
             label = f"grid {grid}, {row['backend']}" + (f", {row['images']} images" if row["images"] > 1 else "")
             ours = 1e3 / (row["images"] * milliseconds)
             cells.append(Cell(label, machine, "FPS", published=row["fps"], ours=ours, aim=AIM, frame=f"garden{grid}"))
-    return Result(name="splats-profile", title=TITLE, source=SOURCE, cells=cells, notes=notes)
+    return Result("splats-profile", TITLE, SOURCE, cells, notes=notes)
 
 
 TITLE = "gsplat's profile: frames a second at 1920x1080"

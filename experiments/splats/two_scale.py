@@ -43,16 +43,11 @@ def run(progress: Progress) -> Result:
     scenes, missing = scenes_here()
     rows = on_each(scenes, MACHINES, frames, progress)
     table = pd.DataFrame(rows)
-    return Result(
-        name="splats-two_scale",
-        title=TITLE,
-        source=SOURCE,
-        cells=list(_cells(table)),
-        answer=_answer(table),
-        notes=list(_notes(table)),
-        warnings=missing,
-        tables={"frames": table},
-    )
+    cells = list(_cells(table))
+    answer = _answer(table)
+    notes = list(_notes(table))
+    tables = {"frames": table}
+    return Result("splats-two_scale", TITLE, SOURCE, cells, answer, notes=notes, warnings=missing, tables=tables)
 
 
 def frames(

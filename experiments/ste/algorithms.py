@@ -63,15 +63,10 @@ def run(progress: Callable[[str], None]) -> Result:
     figures = [_figure(table, machine) for machine in MACHINES]
     notes = [*_winners(table), "All mixes are assumed: counted by hand on the kernels' CUDA form."]
     source = "No published times: modelled"
+    answer = _answer(table)
+    tables = {"runs": table}
     return Result(
-        name="ste/algorithms",
-        title="Which algorithm wins",
-        source=source,
-        cells=cells,
-        answer=_answer(table),
-        figures=figures,
-        notes=notes,
-        tables={"runs": table},
+        "ste/algorithms", "Which algorithm wins", source, cells, answer, figures=figures, notes=notes, tables=tables
     )
 
 

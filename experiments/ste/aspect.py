@@ -60,18 +60,13 @@ def run(progress: Callable[[str], None]) -> Result:
         y_label="STE with the mask - without [points]", log_x=True,
     ))  # fmt: skip
     source = "Yao et al. 2012, section 3: the gain is limited for long or narrow triangles"
-    return Result(
-        name="ste/aspect",
-        title="The mask on narrow polygons",
-        source=source,
-        cells=cells,
-        answer=f"At {ASPECTS[-1]}:1 between {table.gain[table.aspect == ASPECTS[-1]].min():.2f} and "
+    title = "The mask on narrow polygons"
+    answer = (
+        f"At {ASPECTS[-1]}:1 between {table.gain[table.aspect == ASPECTS[-1]].min():.2f} and "
         f"{table.gain[table.aspect == ASPECTS[-1]].max():.2f} times the efficiency, by area; at 1:1 between "
-        f"{table.gain[table.aspect == 1].min():.2f} and {table.gain[table.aspect == 1].max():.2f} times.",
-        figures=[figure],
-        notes=notes,
-        tables={"runs": table},
+        f"{table.gain[table.aspect == 1].min():.2f} and {table.gain[table.aspect == 1].max():.2f} times."
     )
+    return Result("ste/aspect", title, source, cells, answer, figures=[figure], notes=notes, tables={"runs": table})
 
 
 def _measure(area: float, aspect: int) -> dict[str, float]:

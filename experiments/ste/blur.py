@@ -84,16 +84,8 @@ def run(progress: Callable[[str], None]) -> Result:
     )
     figures = [Figure("cost", lambda path: _plot(table, path)), Figure("tests", _maps)]
     source = "Fatahalian et al. 2009 (abstract): interleaving beats intervals at moderate defocus or high motion"
-    return Result(
-        name="ste/blur",
-        title="Blur: intervals against interleaving",
-        source=source,
-        cells=cells,
-        answer=notes[0],
-        figures=figures,
-        notes=notes,
-        tables={"runs": table},
-    )
+    title = "Blur: intervals against interleaving"
+    return Result("ste/blur", title, source, cells, notes[0], figures=figures, notes=notes, tables={"runs": table})
 
 
 def _patterns() -> dict[str, BlurPattern]:

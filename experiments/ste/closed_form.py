@@ -79,15 +79,10 @@ def run(progress: Callable[[str], None]) -> Result:
         y_label="STE [%]", log_x=True, log_y=True,
     ))  # fmt: skip
     source = "Closed form of published/facts.md, section 1.2; definitions of Fatahalian et al. 2009"
+    answer = f"Yes in {all_} of {len(table)} cells, by intervals that hold for all cells together with 95 %."
+    tables = {"intervals": table}
     return Result(
-        name="ste/closed_form",
-        title="STE by stamp and area",
-        source=source,
-        cells=cells,
-        answer=f"Yes in {all_} of {len(table)} cells, by intervals that hold for all cells together with 95 %.",
-        figures=[figure],
-        notes=notes,
-        tables={"intervals": table},
+        "ste/closed_form", "STE by stamp and area", source, cells, answer, figures=[figure], notes=notes, tables=tables
     )
 
 

@@ -60,16 +60,10 @@ def run(progress: Callable[[str], None]) -> Result:
     ))  # fmt: skip
     source = "Eisenacher & Loop 2010, introduction and section 6"
     tables = {"sweep": sweep, "scenes": pd.DataFrame(rows)}
+    title = "The 8x8 stamp on micropolygons"
+    answer = _answer(rows)
     return Result(
-        name="ste/eisenacher",
-        title="The 8x8 stamp on micropolygons",
-        source=source,
-        cells=cells,
-        answer=_answer(rows),
-        figures=[figure],
-        notes=notes,
-        warnings=warnings,
-        tables=tables,
+        "ste/eisenacher", title, source, cells, answer, figures=[figure], notes=notes, warnings=warnings, tables=tables
     )
 
 

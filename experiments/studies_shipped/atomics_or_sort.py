@@ -36,9 +36,12 @@ METHODS = {
 def run(progress: Progress) -> Result:
     """Price both on each machine, for each number of layers."""
     scenes = {f"{layers(side):g}": {"scene": piled(side)} for side in SIDES}
-    fixed = {"size": f"{SIZE}x{SIZE}"}
-    grid = {"layers": scenes, "method": METHODS, "machine": list(MACHINES)}
-    study = Study(title="atomics or sort", fixed=fixed, grid=grid, record=("milliseconds", "bound"))
+    study = Study(
+        title="atomics or sort",
+        fixed={"size": f"{SIZE}x{SIZE}"},
+        grid={"layers": scenes, "method": METHODS, "machine": list(MACHINES)},
+        record=("milliseconds", "bound"),
+    )
     table = table_of(study, progress)
     table = table.assign(layers=table["layers"].astype(float))
     crossings = boundaries(table, "method", "layers", ["machine"])

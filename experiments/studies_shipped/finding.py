@@ -31,7 +31,7 @@ def finding(
 ) -> Result:
     """Make the result of an experiment beside which nothing is published; its first note is its answer."""
     return Result(
-        name=f"{folder}-{name}", title=title, source=SOURCE, cells=list(cells), answer=notes[0],
+        f"{folder}-{name}", title, SOURCE, list(cells), notes[0],
         figures=list(figures), charts=list(charts),
         notes=list(notes), warnings=list(warnings), tables=dict(tables),
     )  # fmt: skip

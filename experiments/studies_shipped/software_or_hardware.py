@@ -23,8 +23,11 @@ SOFTWARE, HARDWARE = "cudaraster", "hardware"
 def run(progress: Progress) -> Result:
     """Price both on each machine, at each size."""
     scenes = {f"{area:g}": {"scene": sheets(area, WIDTH, HEIGHT)} for area in AREAS}
-    grid = {"area": scenes, "pipeline": [SOFTWARE, HARDWARE], "machine": list(MACHINES)}
-    study = Study(title="software or hardware", fixed={"size": f"{WIDTH}x{HEIGHT}"}, grid=grid)
+    study = Study(
+        title="software or hardware",
+        fixed={"size": f"{WIDTH}x{HEIGHT}"},
+        grid={"area": scenes, "pipeline": [SOFTWARE, HARDWARE], "machine": list(MACHINES)},
+    )
     table = table_of(study, progress)
     table = table.assign(area=table["area"].astype(float))
     crossings = boundaries(table, "pipeline", "area", ["machine"])

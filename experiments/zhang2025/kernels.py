@@ -37,9 +37,7 @@ def run(progress: Callable[[str], None]) -> Result:
     notes = _notes()
     if scene is None:
         warning = "bunny_5k is not on the scene path (TILESTAMP_SCENES): nothing was drawn"
-        return Result(
-            name="zhang2025-kernels", title="Ten kernels", source=SOURCE, cells=[], notes=notes, warnings=[warning]
-        )
+        return Result("zhang2025-kernels", "Ten kernels", SOURCE, [], notes=notes, warnings=[warning])
     cells: list[Cell] = []
     errors: dict[str, float] = {}
     table = published("kernels").set_index("kernel")
@@ -68,9 +66,7 @@ def run(progress: Callable[[str], None]) -> Result:
     notes.append(f"Mean miss of a kernel (geometric): {stated}. {best} fits better.")
     title = "Ten kernels before and after"
     answer = _answer(cells, best)
-    return Result(
-        name="zhang2025-kernels", title=title, source=SOURCE, cells=cells, answer=answer, figures=[FIGURE], notes=notes
-    )
+    return Result("zhang2025-kernels", title, SOURCE, cells, answer, figures=[FIGURE], notes=notes)
 
 
 def _answer(cells: list[Cell], machine: str) -> str:

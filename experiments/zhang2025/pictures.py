@@ -42,9 +42,7 @@ def run(progress: Callable[[str], None]) -> Result:
         scene = load_scene(SCENE)
     except TilestampError as error:
         warnings = [str(error)]
-        return Result(
-            name="zhang2025-pictures", title="Features off and on", source=source, cells=[], warnings=warnings
-        )
+        return Result("zhang2025-pictures", "Features off and on", source, [], warnings=warnings)
     matrix = CAMERA.matrix(SIZE, SIZE)
     cells, figures = [], []
     for name, (pipeline, machine, off, on) in PAIRS.items():
@@ -56,13 +54,7 @@ def run(progress: Callable[[str], None]) -> Result:
         figures.append(Figure(name.replace(" ", "_"), _side_by_side(name, frames[0].image, frames[1].image)))
     notes = ["Root mean square difference of 8-bit values over the picture, and the share of pixels that change."]
     return Result(
-        name="zhang2025-pictures",
-        title="Features off and on",
-        source=source,
-        cells=cells,
-        figures=figures,
-        notes=notes,
-        answer=_answer(cells),
+        "zhang2025-pictures", "Features off and on", source, cells, figures=figures, notes=notes, answer=_answer(cells)
     )
 
 

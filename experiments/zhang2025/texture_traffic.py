@@ -104,13 +104,8 @@ def run(progress: Callable[[str], None]) -> Result:
         "Two texels a pixel or more, without mip levels: tiles lose, since texels of a row lie in different ones.",
     ]
     source = "Zhang 2025 names an optimized tile linear storage, without figures"
+    title = "Texture traffic by layout"
+    tables = {"traffic": table}
     return Result(
-        name="zhang2025-texture_traffic",
-        title="Texture traffic by layout",
-        source=source,
-        cells=cells,
-        answer=_answer(cells),
-        figures=[figure],
-        notes=notes,
-        tables={"traffic": table},
+        "zhang2025-texture_traffic", title, source, cells, _answer(cells), figures=[figure], notes=notes, tables=tables
     )
