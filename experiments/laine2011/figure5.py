@@ -1,6 +1,7 @@
 """Figure 5: time of each stage over the area of the triangles, synthetic sweep, GTX 480 (Laine & Karras 2011)."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,15 +45,7 @@ def run(progress: Progress) -> Result:
             cells.append(
                 Cell(f"{area:g} px", stage, "ns/triangle", published=asked, ours=ns, aim=WORST_AIM, frame=frame)
             )
-            rows.append(
-                {
-                    "area": area,
-                    "stage": stage,
-                    "ns": ns,
-                    "published": asked,
-                    "bound": _bound(made, stage),
-                }
-            )
+            rows.append({"area": area, "stage": stage, "ns": ns, "published": asked, "bound": _bound(made, stage)})
         cells += counter_cells(area, made.frame.facts["counters"], triangles)
     table = pd.DataFrame(rows)
     return Result(
@@ -84,17 +77,9 @@ def counter_cells(area: float, counters: dict[str, float], triangles: int) -> li
     """Events of one area beside the reference for re-implementations, rounded as it is."""
     reference = published(__file__, "sweep_counters")
     ours = {**counters, "triangles": float(triangles)}
+    cell = partial(Cell, f"{area:g} px", status="reproduced", aim=COUNTER_AIM, frame=frame_name(area))
     return [
-        Cell(
-            f"{area:g} px",
-            row.counter,
-            "",
-            published=float(row.value),
-            ours=round(ours[row.counter], _digits(row.value)),
-            status="reproduced",
-            aim=COUNTER_AIM,
-            frame=frame_name(area),
-        )
+        cell(row.counter, "", published=float(row.value), ours=round(ours[row.counter], _digits(row.value)))
         for row in reference[reference["area"] == area].itertuples()
     ]
 

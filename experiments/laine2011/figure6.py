@@ -8,7 +8,7 @@ import pandas as pd
 
 from tilestamp.experiments.harness.published import published
 from tilestamp.experiments.harness.registry import Progress
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.experiments.laine2011.sweep import HEIGHT, MACHINE, SOURCE, STAGES, WIDTH
 from tilestamp.experiments.laine2011.table3 import CAMERA, FULL, buddha, load_buddha, reduced_warning
 from tilestamp.reports.plots import lines
@@ -89,17 +89,9 @@ def slope_cells(published_name: str, name: str, ours: pd.DataFrame) -> list[Cell
         asked = slope(counts.to_numpy(), theirs["value"].to_numpy())
         mine = ours[ours["stage"] == stage]
         found = slope(mine["batches"].to_numpy(), mine["ms"].to_numpy())
-        cells.append(
-            Cell(
-                f"{published_name} ({name})",
-                f"{stage}: a further batch",
-                "us",
-                published=1e3 * asked,
-                ours=1e3 * found,
-                status="reported" if name == FULL else "stand-in",
-                aim=AIM,
-            )
-        )
+        row, column = f"{published_name} ({name})", f"{stage}: a further batch"
+        status: Status = "reported" if name == FULL else "stand-in"
+        cells.append(Cell(row, column, "us", published=1e3 * asked, ours=1e3 * found, status=status, aim=AIM))
     return cells
 
 

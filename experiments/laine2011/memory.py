@@ -31,17 +31,8 @@ def run(progress: Progress) -> Result:
     for scene in statistics():
         row = table.loc[scene.name]
         setup = scene.triangles * SUBTRIANGLE_BYTES["1.1"] / 2**20
-        cells.append(
-            Cell(
-                scene.name,
-                "setup data",
-                "MB",
-                published=float(row["triangle_setup_MB"]),
-                ours=setup,
-                aim=SETUP_AIM,
-                frame=frame_name(scene.name, WIDTH, HEIGHT),
-            )
-        )
+        asked, frame = float(row["triangle_setup_MB"]), frame_name(scene.name, WIDTH, HEIGHT)
+        cells.append(Cell(scene.name, "setup data", "MB", published=asked, ours=setup, aim=SETUP_AIM, frame=frame))
         if scene.name in drawn:
             progress(f"laine2011/memory: {scene.name}")
             used = draw(scene.name, "cudaraster", WIDTH, HEIGHT).frame.facts["memory_mb"]

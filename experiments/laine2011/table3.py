@@ -1,6 +1,7 @@
 """Table 3: stage times, memory and the profiler's counters, Buddha, first camera, GTX 480 (Laine & Karras 2011)."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -105,56 +106,18 @@ def counter_cells(made: Run, status: Status) -> list[Cell]:
     facts = made.frame.facts
     table = published(__file__, "gtx480-cuda40")
     rows = table[(table["table"] == "table3") & (table["scene"] == "Buddha")]
-    cells = []
+    cells, cell = [], partial(Cell, status=status, aim=COUNTER_AIM)
     for stage, kernel in KERNELS.items():
         asked = float(rows.loc[rows["key"] == kernel, "value"].iloc[0])
-        cells.append(
-            Cell(
-                kernel,
-                "time",
-                "ms",
-                published=asked,
-                ours=float(made.stages.loc[stage, "milliseconds"]),
-                status=status,
-                aim=TIME_AIM,
-            )
-        )
+        ours = float(made.stages.loc[stage, "milliseconds"])
+        cells.append(Cell(kernel, "time", "ms", published=asked, ours=ours, status=status, aim=TIME_AIM))
     for name, buffer in SEGMENTS.items():
         asked = rows[rows["key"] == name].set_index("column")["value"]
-        cells.append(
-            Cell(
-                name,
-                "count",
-                "",
-                published=float(asked["count"]),
-                ours=float(facts[name]),
-                status=status,
-                aim=COUNTER_AIM,
-            )
-        )
-        cells.append(
-            Cell(
-                name,
-                "memory",
-                "MB",
-                published=float(asked["MB"]),
-                ours=facts["memory_mb"][buffer],
-                status=status,
-                aim=COUNTER_AIM,
-            )
-        )
+        cells.append(cell(name, "count", "", published=float(asked["count"]), ours=float(facts[name])))
+        cells.append(cell(name, "memory", "MB", published=float(asked["MB"]), ours=facts["memory_mb"][buffer]))
     for row in rows[rows["column"].str.startswith("counters")].itertuples():
         unit = "%" if row.column.endswith("percent") else ""
         stage, _, counter = row.key.partition(" / ")
-        cells.append(
-            Cell(
-                stage,
-                counter,
-                unit,
-                published=float(row.value),
-                ours=float(facts["counters"][row.key]),
-                status=status,
-                aim=COUNTER_AIM,
-            )
-        )
+        ours = float(facts["counters"][row.key])
+        cells.append(cell(stage, counter, unit, published=float(row.value), ours=ours))
     return cells

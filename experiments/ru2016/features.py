@@ -30,17 +30,10 @@ def run(progress: Callable[[str], None]) -> Result:
         if frames[0] is None or frames[1] is None:
             absent.append(name)
             continue
-        difference = frames[0].milliseconds - frames[1].milliseconds
+        asked = float(row["on_ms"]) - float(row["off_ms"])
+        ours = frames[0].milliseconds - frames[1].milliseconds
         cells.append(
-            Cell(
-                name,
-                "bilinear - nearest",
-                "ms",
-                published=float(row["on_ms"]) - float(row["off_ms"]),
-                ours=difference,
-                aim=1.0,
-                frame=frame_name(name),
-            )
+            Cell(name, "bilinear - nearest", "ms", published=asked, ours=ours, aim=1.0, frame=frame_name(name))
         )
     occlusion = table[table.feature == "ssao"]
     speed = _speed(occlusion)

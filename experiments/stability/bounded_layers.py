@@ -84,13 +84,10 @@ def run(progress: Progress) -> Result:
 def _boundary(table: pd.DataFrame, method: str, order: str, front_first: bool) -> Boundary:
     worst = table[table["method"] == f"{method}, {order}"].iloc[-1]
     own, lists = (draw(LAYERS[-1], options, front_first=front_first) for options in (METHODS[method], EXACT))
-    return Boundary(
-        f"cudaraster, {method}, {order}",
-        "transparent layers over a pixel",
-        "",
-        *boundary(method, front_first=front_first),
-        f"colours are wrong: up to {worst.off} of 255 at {worst.layers} layers",
-        "linked lists",
+    name, ends = f"cudaraster, {method}, {order}", boundary(method, front_first=front_first)
+    wrong = f"colours are wrong: up to {worst.off} of 255 at {worst.layers} layers"
+    cost = (
         f"{lists.milliseconds:.4g} ms instead of {own.milliseconds:.4g} on {MACHINE} at {LAYERS[-1]} layers, and "
-        f"{lists.frame.facts['list_bytes'] / SIZE**2:.0f} bytes a pixel",
+        f"{lists.frame.facts['list_bytes'] / SIZE**2:.0f} bytes a pixel"
     )
+    return Boundary(name, "transparent layers over a pixel", "", *ends, wrong, "linked lists", cost)

@@ -97,20 +97,16 @@ def run(progress: Progress) -> Result:
     given = table[table.edge == "as given"]
     band = given[given.error > WRONG].length
     vertices = pole_levels(0.0).shape[1]
+    off = f"vertices at the pole are up to {given.error.max()} of 255 levels off"
+    about = (
+        f"tangents are roundings and normals point anywhere: {off}",
+        f"weld control points within {WELD:g} radii once a model",
+        f"no time in the frame; {vertices} vertices of {16 * len(frame(0.0).grids.boxes)} borrow their normal",
+    )
+    name, parameter = "micropolygon, an edge nearly collapsed", "length of the edge"
     boundaries = [
-        Boundary(
-            "micropolygon, an edge nearly collapsed",
-            "length of the edge",
-            "radii",
-            *boundary(),
-            f"tangents are roundings and normals point anywhere: vertices at the pole are up to {given.error.max()} of"
-            " 255 levels off",
-            f"weld control points within {WELD:g} radii once a model",
-            f"no time in the frame; {vertices} vertices of {16 * len(frame(0.0).grids.boxes)} borrow their normal",
-        ),
-        Boundary(
-            "micropolygon, edge welded", "length of the edge", "radii", *boundary(welded=True), "normals are noise"
-        ),
+        Boundary(name, parameter, "radii", *boundary(), *about),
+        Boundary("micropolygon, edge welded", parameter, "radii", *boundary(welded=True), "normals are noise"),
     ]
     failing = f"Lengths tried that fail: {band.min():.2g} to {band.max():.2g} radii"
     notes = [f"{failing}; no length at all is {error(0.0)} levels off, for its normal is borrowed.", _teapot()]

@@ -6,7 +6,7 @@ all sub-patches have the same depth. Cures: that same depth, or snapping the fin
 (``snap_edges``).
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -99,21 +99,10 @@ def run(progress: Progress) -> Result:
     shown, seed = BOUNDS[-1], SEEDS[-1]
     wrong = cracks(shown, seed)
     title = f"{int(wrong.sum())} crack pixels at a bound of {shown:g} pixels"
+    plot = partial(lines, table, x="bound", y="crack_pixels", by="cure")
+    sheets = f"Crack pixels of {len(SEEDS)} rough sheets, {WIDTH}x{HEIGHT}"
     figures = [
-        Figure(
-            "cracks",
-            lambda path: lines(
-                table,
-                path,
-                x="bound",
-                y="crack_pixels",
-                by="cure",
-                title=f"Crack pixels of {len(SEEDS)} rough sheets, {WIDTH}x{HEIGHT}",
-                x_label="bound [pixels]",
-                y_label="crack pixels",
-                log_x=True,
-            ),
-        ),
+        Figure("cracks", partial(plot, title=sheets, x_label="bound [pixels]", y_label="crack pixels", log_x=True)),
         Figure(
             "picture", lambda path: wrong_pixels(frame(shown, seed, "as published").image, wrong, path, title=title)
         ),

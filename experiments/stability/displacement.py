@@ -103,19 +103,11 @@ def _row(bound: float, amplitude: float) -> dict[str, float]:
 def _boundary(table: pd.DataFrame, bound: float) -> Boundary:
     rows = table[table.bound == bound]
     worst = rows.iloc[-1]
-    holds, breaks = boundary(bound)
-    return Boundary(
-        f"micropolygon, bound {bound:g}, tiles of {TILE}",
-        "displacement",
-        "pixels",
-        holds,
-        breaks,
-        f"quads are missing in the third tile: {worst.lost_pixels:.0f} of {WIDTH * HEIGHT} pixels at"
-        f" {worst.amplitude:g} pixels",
-        "as many slots a patch as the displaced box can touch",
-        f"bucketing and raster of {worst.amplitude:g} pixels {worst.wide_slots_ms:.3g} ms instead of"
-        f" {worst.four_slots_ms:.3g}",
-    )
+    method, height = f"micropolygon, bound {bound:g}, tiles of {TILE}", f"{worst.amplitude:g} pixels"
+    wrong = f"quads are missing in the third tile: {worst.lost_pixels:.0f} of {WIDTH * HEIGHT} pixels at {height}"
+    cure = "as many slots a patch as the displaced box can touch"
+    cost = f"bucketing and raster of {height} {worst.wide_slots_ms:.3g} ms instead of {worst.four_slots_ms:.3g}"
+    return Boundary(method, "displacement", "pixels", *boundary(bound), wrong, cure, cost)
 
 
 def _notes(table: pd.DataFrame) -> list[str]:

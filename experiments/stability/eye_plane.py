@@ -62,18 +62,13 @@ def run(progress: Progress) -> Result:
     passes = frame(DISTANCES[-1]).subpatches.passes[:, 0]
     holds, breaks = found[MAX_DEPTH]
     with_near = boundary(near=NEAR)
+    parameter = "distance of the eye from the surface"
+    wrong = "sub-patches across the eye's plane are still large at the depth limit and are dropped"
     boundaries = [
-        Boundary(
-            f"micropolygon, at most {depth} halvings",
-            "distance of the eye from the surface",
-            "patch sides",
-            *found[depth],
-            "sub-patches across the eye's plane are still large at the depth limit and are dropped",
-        )
+        Boundary(f"micropolygon, at most {depth} halvings", parameter, "patch sides", *found[depth], wrong)
         for depth in DEPTHS[:-1]
     ]
     method = f"micropolygon, at most {MAX_DEPTH} halvings"
-    parameter = "distance of the eye from the surface"
     wrong = f"sub-patches are dropped: {_holes(rows)}"
     cure = f"cull sub-patches wholly nearer than {NEAR:g} sides (near)"
     boundaries.append(Boundary(method, parameter, "patch sides", holds, breaks, wrong, cure, _cost(holds)))

@@ -60,19 +60,13 @@ def run(progress: Progress) -> Result:
     ]
     table = pd.DataFrame(rows)
     halves, whole = (frame(GAPS[0], packing).milliseconds for packing in ("32", "64"))
-    boundaries = [
-        Boundary(
-            f"freepipe, packing {packing}",
-            "distance of two sheets",
-            "NDC depth",
-            *boundary(packing),
-            f"halves of two colours meet: {table[table.packing == f'{packing} bits'].mixed.max():.0f} % of"
-            " the pixels at worst",
-            "one 64-bit atomicMin" if packing == "32" else "",
-            f"{whole:.4g} ms instead of {halves:.4g} on {MACHINE}" if packing == "32" else "",
-        )
-        for packing in ("32", "64")
-    ]
+    cost = f"{whole:.4g} ms instead of {halves:.4g} on {MACHINE}"
+    boundaries = []
+    for packing, *cure in (("32", "one 64-bit atomicMin", cost), ("64",)):
+        worst = table[table.packing == f"{packing} bits"].mixed.max()
+        about = f"halves of two colours meet: {worst:.0f} % of the pixels at worst", *cure
+        name, ends = f"freepipe, packing {packing}", boundary(packing)
+        boundaries.append(Boundary(name, "distance of two sheets", "NDC depth", *ends, *about))
     notes = [f"One step of the 20-bit depth is {2 * 2.0**-20:.3g} of NDC depth."]
     figures = [Figure("mixed", partial(
         lines, table, x="gap", y="mixed", by="packing", title="Pixels with a colour that no triangle has",

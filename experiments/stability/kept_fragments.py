@@ -71,18 +71,9 @@ def run(progress: Progress) -> Result:
             rows.append((layers, order, fragments, 100 * pixels / SIZE**2, *times))
     table = pd.DataFrame(rows, columns=["layers", "order", "fragments lost", "wrong", "four_ms", "all_ms"])
     boundaries = [_boundary(table, order) for order in ORDERS]
-    boundaries.append(
-        Boundary(
-            "binned, fragment stream",
-            "layers over the screen",
-            "",
-            *stream_boundary(),
-            f"{beyond_the_stream(LAYERS[-1])} fragments at {LAYERS[-1]} layers exceed its room of {OVERDRAW} a pixel"
-            " (a quad takes four)",
-            "let it grow, as here",
-            f"{4 * FRAGMENT_OUT_BYTES} bytes a quad",
-        )
-    )
+    exceed = f"{beyond_the_stream(LAYERS[-1])} fragments at {LAYERS[-1]} layers exceed its room of {OVERDRAW} a pixel"
+    about = f"{exceed} (a quad takes four)", "let it grow, as here", f"{4 * FRAGMENT_OUT_BYTES} bytes a quad"
+    boundaries.append(Boundary("binned, fragment stream", "layers over the screen", "", *stream_boundary(), *about))
     figures = [Figure("wrong", partial(
         lines, table, x="layers", y="wrong", by="order", title=f"Pixels that lack a layer with {KEPT} fragments kept",
         x_label="layers over a pixel", y_label="pixels [%]",
@@ -95,13 +86,7 @@ def run(progress: Progress) -> Result:
 def _boundary(table: pd.DataFrame, order: str) -> Boundary:
     rows = table[table.order == order]
     last = rows.iloc[-1]
-    return Boundary(
-        f"binned, order {order}",
-        "layers over a pixel",
-        "",
-        *boundary(order),
-        f"layers are missing: {np.round(last.wrong):.0f} % of the pixels at {last.layers} layers",
-        "keep all fragments",
-        f"{last.all_ms:.4g} ms instead of {last.four_ms:.4g} on {MACHINE} at {last.layers} layers, more"
-        " shared memory not counted",
-    )
+    wrong = f"layers are missing: {np.round(last.wrong):.0f} % of the pixels at {last.layers} layers"
+    times = f"{last.all_ms:.4g} ms instead of {last.four_ms:.4g} on {MACHINE} at {last.layers} layers"
+    about = wrong, "keep all fragments", f"{times}, more shared memory not counted"
+    return Boundary(f"binned, order {order}", "layers over a pixel", "", *boundary(order), *about)

@@ -5,7 +5,7 @@ is left standing. The same frame is drawn in many orders of its warps, each a po
 shows in what share of the runs a pixel is wrong.
 """
 
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -70,40 +70,16 @@ def run(progress: Progress) -> Result:
     shares = wrong_runs(SHOWN)
     safe = simulate(layered(SHOWN, CELLS), "tiled", MACHINE, width=SIZE, height=SIZE)
     ever, always = 100 * float((shares > 0).mean()), 100 * float((shares == 1).mean())
-    found = Boundary(
-        "per-primitive",
-        "layers over a pixel",
-        "",
-        *boundary(),
-        f"with {SHOWN} layers {ever:.0f} % of the pixels are wrong in one of {SEEDS} runs, {always:.2f} % in all",
-        "a block a tile, depth and colour in registers (pipeline tiled)",
-        f"{safe.milliseconds:.4g} ms instead of {frame(SHOWN, 0).milliseconds:.4g} on {MACHINE}",
-    )
-    figures = [
-        Figure(
-            "map",
-            lambda path: heat_map(
-                shares,
-                path,
-                title=f"Share of {SEEDS} runs in which a pixel is wrong, {SHOWN} layers",
-                unit="share of the runs",
-                size=(SIZE, SIZE),
-            ),
-        ),
-        Figure(
-            "layers",
-            lambda path: lines(
-                table,
-                path,
-                x="layers",
-                y="wrong",
-                by="runs",
-                title=f"Pixels left wrong by unprotected writes, {SEEDS} orders of the warps",
-                x_label="layers over a pixel",
-                y_label="pixels that are wrong [%]",
-            ),
-        ),
-    ]
+    fault = f"with {SHOWN} layers {ever:.0f} % of the pixels are wrong in one of {SEEDS} runs, {always:.2f} % in all"
+    cure = "a block a tile, depth and colour in registers (pipeline tiled)"
+    cost = f"{safe.milliseconds:.4g} ms instead of {frame(SHOWN, 0).milliseconds:.4g} on {MACHINE}"
+    found = Boundary("per-primitive", "layers over a pixel", "", *boundary(), fault, cure, cost)
+    title = f"Share of {SEEDS} runs in which a pixel is wrong, {SHOWN} layers"
+    map_ = partial(heat_map, shares, title=title, unit="share of the runs", size=(SIZE, SIZE))
+    title = f"Pixels left wrong by unprotected writes, {SEEDS} orders of the warps"
+    by_layers = partial(lines, table, x="layers", y="wrong", by="runs", title=title)
+    by_layers = partial(by_layers, x_label="layers over a pixel", y_label="pixels that are wrong [%]")
+    figures = [Figure("map", map_), Figure("layers", by_layers)]
     notes = [
         f"Between two runs of {SHOWN} layers {_between():.2f} % of the pixels differ on average.",
         "How many rounds a write may be late (1 to 3) is assumed; with another number the shares change, not the cure.",

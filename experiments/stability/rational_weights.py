@@ -5,6 +5,7 @@ sub-patches there must be as small as the weight, and the depth limit drops them
 surface, column k times ``alpha**k``, so that both ends move equally fast; once a model, before any frame.
 """
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -71,16 +72,9 @@ def run(progress: Progress) -> Result:
     rows = [_row(weight, cure) for cure in CURES for weight in WEIGHTS]
     table = pd.DataFrame(rows)
     boundaries = [_boundary(table, cure) for cure in CURES]
-    boundaries += [
-        Boundary(
-            f"micropolygon, at most {depth} halvings",
-            "weight of one edge",
-            "",
-            *boundary(depth),
-            "sub-patches are dropped",
-        )
-        for depth in DEPTHS[:-1]
-    ]
+    for depth in DEPTHS[:-1]:
+        name = f"micropolygon, at most {depth} halvings"
+        boundaries.append(Boundary(name, "weight of one edge", "", *boundary(depth), "sub-patches are dropped"))
     shown = [table[(table.cure == cure) & (table.weight == WEIGHTS[3])].iloc[0] for cure in CURES]
     counts = ", ".join(f"{row.subpatches} sub-patches of up to {row.depth} halvings {row.cure}" for row in shown)
     even = f"{rows[0]['subpatches']} of up to {rows[0]['depth']} with equal weights"
@@ -112,15 +106,11 @@ def _boundary(table: pd.DataFrame, cure: str) -> Boundary:
     rows = table[table.cure == cure]
     plain, cured = (table[(table.cure == c) & (table.weight == 1)].iloc[0].ms for c in CURES)
     given = cure == "as given"
-    return Boundary(
-        f"micropolygon, at most {DEPTHS[-1]} halvings, weights {cure}",
-        "weight of one edge",
-        "",
-        *boundary(balanced=not given),
-        f"sub-patches at that edge are dropped at the depth limit, up to {rows.percent.max():.0f} % of the square",
-        "balance the weights once a model" if given else "",
-        f"no time in the frame: {cured:.4g} ms of bound and split and dicing, {plain:.4g} as given" if given else "",
-    )
+    name = f"micropolygon, at most {DEPTHS[-1]} halvings, weights {cure}"
+    wrong = f"sub-patches at that edge are dropped at the depth limit, up to {rows.percent.max():.0f} % of the square"
+    found = Boundary(name, "weight of one edge", "", *boundary(balanced=not given), wrong)
+    cost = f"no time in the frame: {cured:.4g} ms of bound and split and dicing, {plain:.4g} as given"
+    return replace(found, cure="balance the weights once a model", cost=cost) if given else found
 
 
 def _plot(table: pd.DataFrame, path: Path, column: str, label: str) -> None:

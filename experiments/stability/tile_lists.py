@@ -82,26 +82,14 @@ def run(progress: Progress) -> Result:
     fixed, safe = frame(MODEL, calm).milliseconds, frame(MODEL, calm, "safe").milliseconds
     cost = f"{safe:.4g} ms instead of {fixed:.4g} on {MACHINE} where nothing overflows"
     small = lost(101, 101)
+    most = f"{rows[-1]['entries lost']} entries and {rows[-1]['wrong pixels']} of 64 pixels at {SHARES[-1]:.0%}"
+    falls = f"room falls from all to a tenth of them: {small[0]} entries and {small[1]} pixels are lost at 101"
     boundaries = [
-        Boundary(
-            "tiled, original lists",
-            f"share of {MODEL} triangles in one tile",
-            "",
-            *share_boundary(),
-            f"triangles are lost: {rows[-1]['entries lost']} entries and {rows[-1]['wrong pixels']} of 64 pixels at"
-            f" {SHARES[-1]:.0%}",
-            "count, scan, fill (capacity safe)",
-            cost,
-        ),
-        Boundary(
-            "tiled, original lists",
-            "triangles, all in one tile",
-            "",
-            *count_boundary(),
-            f"room falls from all to a tenth of them: {small[0]} entries and {small[1]} pixels are lost at 101",
-            "count, scan, fill (capacity safe)",
-            cost,
-        ),
+        Boundary("tiled, original lists", parameter, "", *ends, wrong, "count, scan, fill (capacity safe)", cost)
+        for parameter, ends, wrong in (
+            (f"share of {MODEL} triangles in one tile", share_boundary(), f"triangles are lost: {most}"),
+            ("triangles, all in one tile", count_boundary(), falls),
+        )
     ]
     figures = [Figure("lost", partial(
         lines, table.melt("share", var_name="what", value_name="count"), x="share", y="count", by="what",

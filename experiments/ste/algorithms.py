@@ -5,6 +5,7 @@ of the two. Instruction mixes are assumed (counted by hand), so differences of s
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -129,18 +130,5 @@ def _answer(table: pd.DataFrame) -> str:
 
 def _figure(table: pd.DataFrame, machine: str) -> Figure:
     rows = table[table.machine == machine]
-    return Figure(
-        machine,
-        lambda path: lines(
-            rows,
-            path,
-            x="area",
-            y="ns",
-            by="algorithm",
-            title=f"Modelled time of a square on {machine}",
-            x_label="area [pixels]",
-            y_label="ns a polygon",
-            log_x=True,
-            log_y=True,
-        ),
-    )
+    plot = partial(lines, rows, x="area", y="ns", by="algorithm", x_label="area [pixels]", y_label="ns a polygon")
+    return Figure(machine, partial(plot, title=f"Modelled time of a square on {machine}", log_x=True, log_y=True))

@@ -59,15 +59,8 @@ def run(progress: Callable[[str], None]) -> Result:
             rows += _measure(way, radius)
     table = pd.DataFrame(rows)
     cells = [
-        reported(f"{r['way']:g} px, circle {r['radius']:g} px", f"{r['algorithm']}, STE", "%", r["ste"]) for r in rows
-    ]
-    cells += [
-        reported(
-            f"{r['way']:g} px, circle {r['radius']:g} px",
-            f"{r['algorithm']}, cost",
-            "instructions a polygon",
-            r["cost"],
-        )
+        reported(f"{r['way']:g} px, circle {r['radius']:g} px", f"{r['algorithm']}, {what}", unit, r[what.lower()])
+        for what, unit in (("STE", "%"), ("cost", "instructions a polygon"))
         for r in rows
     ]
     ways = [f"interleaved {tile**2 * SPP}" for tile in TILES]

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from tilestamp.experiments.harness.result import Cell, Figure, Result
+from tilestamp.experiments.harness.result import Cell, Figure, Result, Status
 from tilestamp.models.simt import Simt
 from tilestamp.reports.plots import lines
 from tilestamp.simulator.scenes import read_camera
@@ -83,16 +83,11 @@ def _measure(name: str) -> list[dict[str, Any]]:
 
 def _cell(row: dict[str, Any]) -> Cell:
     compared = row["published"] is not None
-    return Cell(
-        f"{row['scene']}, {row['lanes']} lanes",
-        f"{row['algorithm']}, lanes at work",
-        "%",
-        published=row["published"],
-        ours=row["utilisation"],
-        status="reproduced" if compared else "reported",
-        aim=0.05 if compared else None,
-        frame=f"{row['scene']} {WIDTH}x{HEIGHT}",
-    )
+    place, column = f"{row['scene']}, {row['lanes']} lanes", f"{row['algorithm']}, lanes at work"
+    status: Status = "reproduced" if compared else "reported"
+    aim, frame = 0.05 if compared else None, f"{row['scene']} {WIDTH}x{HEIGHT}"
+    ours, published = row["utilisation"], row["published"]
+    return Cell(place, column, "%", published=published, ours=ours, status=status, aim=aim, frame=frame)
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
