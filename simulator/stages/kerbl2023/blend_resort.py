@@ -191,13 +191,8 @@ def resort_work(table: NDArray[np.int64], tiles: Tiles, window: int, count: int 
         Stream("colours", "load", 32 * COLOURS * total[_E.BLENDED], 4 * COLOURS * used, span_bytes=span),
         Stream("framebuffer", "store", total[_E.STORE_BYTES], 4 * PLANES * total[_E.PIXELS]),
     )
+    shared = (SHARED_BYTES + 4 * RAY_WORDS) * tiles.pixels
+    variant = f"window {window}"
     return Work(
-        "blend",
-        _E,
-        table,
-        tiles.pixels,
-        kernel="blend_resort",
-        shared_bytes=(SHARED_BYTES + 4 * RAY_WORDS) * tiles.pixels,
-        variant=f"window {window}",
-        streams=streams,
+        "blend", _E, table, tiles.pixels, kernel="blend_resort", shared_bytes=shared, variant=variant, streams=streams
     )

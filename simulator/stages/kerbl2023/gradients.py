@@ -98,13 +98,8 @@ def _work(table: NDArray[np.int64], wanted: NDArray[np.int64], tiles: Tiles, pai
         Stream("entries", "load", moved, moved),
         Stream("gradients", "atomic", requested, CHUNK_BYTES * len(wanted)),
     )
+    block = tiles.pixels
+    shared = SHARED_BYTES * tiles.pixels
     return Work(
-        "gradients",
-        _E,
-        table,
-        tiles.pixels,
-        shared_bytes=SHARED_BYTES * tiles.pixels,
-        streams=streams,
-        atomic_requests=wanted,
-        variant=atomics,
+        "gradients", _E, table, block, shared_bytes=shared, streams=streams, atomic_requests=wanted, variant=atomics
     )

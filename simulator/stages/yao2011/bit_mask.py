@@ -98,14 +98,9 @@ def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: i
     table = np.zeros((len(starts) - 1, len(BitMaskEvent)), np.int64)
     draw_in_parts(_bit_mask, len(table), samples, polygons.vertices, starts, KINDS.index(kind), lanes, simt, table)
     streams = sample_streams(polygons.vertices.nbytes, samples, BitMaskEvent, table)
+    shared = SHARED_WORDS * 4
     work = warp_queue(
-        "bit_mask",
-        BitMaskEvent,
-        table,
-        simt,
-        shared_bytes=SHARED_WORDS * 4,
-        streams=streams,
-        atomic_requests=samples.requests,
+        "bit_mask", BitMaskEvent, table, simt, shared_bytes=shared, streams=streams, atomic_requests=samples.requests
     )
     return StageResult(samples, (work,))
 

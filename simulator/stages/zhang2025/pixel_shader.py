@@ -173,34 +173,17 @@ def pixel_shader(
     else:
         for_parts(_pixel_shader_planes, parts_of(count, BLOCK), lanes, *inputs)
     _add_costs(events, optimized)
-    total = events.sum(axis=0)
-    texels = min(
-        int(total[PixelShaderEvent.TEXTURE_BYTES]), len(chains.texels) * TEXEL_BYTES
-    )  # neighbours reuse them at once
+    total = dict(zip(PixelShaderEvent, events.sum(axis=0).tolist(), strict=True))
+    texels = min(total[PixelShaderEvent.TEXTURE_BYTES], len(chains.texels) * TEXEL_BYTES)  # neighbours reuse them
+    read, stored = count * FRAGMENT_BYTES, total[PixelShaderEvent.STORE_BYTES]
+    lines_in = LINES_IN * (3 * total[PixelShaderEvent.WARPS] - total[PixelShaderEvent.TEXTURED_WARPS])
+    lines_out = 2 * LINES_OUT * total[PixelShaderEvent.WARPS]
+    linked = 32 * total[PixelShaderEvent.ATOMIC_REQUESTS]
     streams = (
-        Stream(
-            "fragments",
-            "load",
-            count * FRAGMENT_BYTES,
-            count * FRAGMENT_BYTES,
-            partial_lines=LINES_IN * int(3 * total[PixelShaderEvent.WARPS] - total[PixelShaderEvent.TEXTURED_WARPS]),
-        ),
+        Stream("fragments", "load", read, read, partial_lines=lines_in),
         Stream("texture", "load", texels, texels),
-        Stream(
-            "fragments_out",
-            "store",
-            int(total[PixelShaderEvent.STORE_BYTES]),
-            count * FRAGMENT_OUT_BYTES,
-            AT_ONCE,
-            partial_lines=2 * LINES_OUT * int(total[PixelShaderEvent.WARPS]),
-        ),
-        Stream(
-            "pixel_base",
-            "atomic",
-            32 * int(total[PixelShaderEvent.ATOMIC_REQUESTS]),
-            min(4 * count, 4 * pixels),
-            AT_ONCE,
-        ),
+        Stream("fragments_out", "store", stored, count * FRAGMENT_OUT_BYTES, AT_ONCE, partial_lines=lines_out),
+        Stream("pixel_base", "atomic", linked, min(4 * count, 4 * pixels), AT_ONCE),
     )
     kernel = "PixelShader" if optimized else "PixelShader_before"
     variant = "" if derivatives == "quads" else derivatives

@@ -162,15 +162,10 @@ def primitive_binning(
     entries = np.empty(int(starts[-1]), np.int32)
     _fill(boxes, columns, rows, starts[:-1].copy(), entries)
     _add_costs(events, counts, len(boxes), simt)
-    total = events.sum(axis=0)
+    stored = int(events[:, PrimitiveBinningEvent.STORE_BYTES].sum())
     streams = (
         Stream("compacted", "load", 3 * 32 * len(boxes), 3 * 32 * len(boxes)),
-        Stream(
-            "bin_queue",
-            "store",
-            int(total[PrimitiveBinningEvent.STORE_BYTES]),
-            4 * len(entries) + 8 * MAX_BINS * work_blocks,
-        ),
+        Stream("bin_queue", "store", stored, 4 * len(entries) + 8 * MAX_BINS * work_blocks),
     )
     stage = "PrimitiveBinning"
     work = Work(stage, PrimitiveBinningEvent, events, BLOCK, grid=blocks, shared_bytes=SHARED_BYTES, streams=streams)
