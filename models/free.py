@@ -138,6 +138,5 @@ def _level(units: Loads, alone: NDArray[np.float64], places: int) -> float:
     """All places and SMs busy from the first unit to the end; the terms see to draws and to starts."""
     count = len(alone)
     return max(
-        float(alone.sum()) / min(places, count),
-        units.pace.start + float(units.sm.sum()) / min(units.sms, count),
+        float(alone.sum()) / min(places, count), units.pace.start + float(units.sm.sum()) / min(units.sms, count)
     )

@@ -23,8 +23,7 @@ def test_counts_and_prices_of_small_frames_are_those_of_the_ledger(pipeline):
 @pytest.mark.shared
 @pytest.mark.usefixtures("shared")
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[] if name in cells.QUICK else pytest.mark.cells) for name in cells.experiments()],
+    "name", [pytest.param(name, marks=[] if name in cells.QUICK else pytest.mark.cells) for name in cells.experiments()]
 )
 def test_cells_of_experiments_are_those_of_the_ledger(name):
     path = book.FOLDER / "cells" / f"{cells.file_name(name)}.csv"

@@ -8,10 +8,7 @@ from tilestamp.models.machine import altered, list_machines, load_machine
 from tilestamp.models.occupancy import residency
 
 
-@pytest.mark.parametrize(
-    ("tile", "blocks", "share"),
-    [(4, 16, 0.25), (8, 16, 0.5), (16, 4, 0.5), (32, 1, 0.5)],
-)
+@pytest.mark.parametrize(("tile", "blocks", "share"), [(4, 16, 0.25), (8, 16, 0.5), (16, 4, 0.5), (32, 1, 0.5)])
 def test_tile_sizes_on_a_gt_750m_with_63_registers(tile, blocks, share):
     """Ru 2016: 25, 50, 50, 50 % as Nsight showed them."""
     held = residency(load_machine("gt750m"), tile * tile, 63, 0)

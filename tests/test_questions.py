@@ -203,8 +203,7 @@ def test_a_search_goes_round_cells_that_have_no_time():
 
 
 @pytest.mark.parametrize(
-    ("library", "question"),
-    [("SALib.sample", screen), ("SALib.sample", sobol), ("optuna", search)],
+    ("library", "question"), [("SALib.sample", screen), ("SALib.sample", sobol), ("optuna", search)]
 )
 def test_a_library_that_is_missing_is_a_sentence(library, question, monkeypatch):
     for name in [name for name in sys.modules if name.startswith(library)]:

@@ -85,8 +85,7 @@ def test_face_colours_of_an_off_are_fractions_or_bytes_each(load):
 
 
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [("a.off", f"OFF\n4 1 0\n{CORNERS}3 0 1.5 2\n"), ("a.ply", f"{PLY}{FACES}{CORNERS}3 0 1.5 2\n")],
+    ("name", "text"), [("a.off", f"OFF\n4 1 0\n{CORNERS}3 0 1.5 2\n"), ("a.ply", f"{PLY}{FACES}{CORNERS}3 0 1.5 2\n")]
 )
 def test_half_a_vertex_is_refused(name, text, load):
     with pytest.raises(TilestampError, match=r"a face uses the vertex 1\.5, which is no whole number"):

@@ -85,10 +85,7 @@ def test_a_broken_obj_line_is_named(text, line, sentence, write):
         read_obj(write("a.obj", text))
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [("", "has no faces"), (SQUARE, "has no faces")],
-)
+@pytest.mark.parametrize(("text", "sentence"), [("", "has no faces"), (SQUARE, "has no faces")])
 def test_an_obj_file_without_a_surface_is_refused(text, sentence, write):
     with pytest.raises(TilestampError, match=rf"a\.obj: .*{sentence}"):
         read_obj(write("a.obj", text))

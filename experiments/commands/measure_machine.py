@@ -12,11 +12,7 @@ from tilestamp.experiments.commands.terminal import progress
 from tilestamp.models.machine import load_machine
 
 
-def measure_machine(
-    *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    base: str = "h200",
-) -> None:
+def measure_machine(*, output: Annotated[Path, Parameter(name=["--output", "-o"])], base: str = "h200") -> None:
     """Run micro-benchmarks on the GPU of this computer and write a machine file, each number with its provenance.
 
     Parameters

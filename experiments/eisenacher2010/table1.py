@@ -36,8 +36,7 @@ def run(progress: Progress) -> Result:
     table = pd.DataFrame(rows)
     made_patches = made.frame.facts["subpatches"]
     cells.insert(
-        0,
-        Cell("all tiles", "sub-patches", "", published=SUBPATCHES, ours=made_patches, aim=COUNT_AIM, frame=KILLEROO),
+        0, Cell("all tiles", "sub-patches", "", published=SUBPATCHES, ours=made_patches, aim=COUNT_AIM, frame=KILLEROO)
     )
     return Result(
         name="eisenacher2010-table1",

@@ -140,8 +140,7 @@ def interleaved_pattern(spp: int, tile: int = 4, seed: int = 7) -> BlurPattern:
     strata = np.argsort(rng.random((spp, tile * tile)), axis=1) + tile * tile * np.arange(spp)[:, None]
     place = rng.random((tile, tile, spp, 2))
     return BlurPattern(
-        np.floor(place * SUBPIXELS).astype(np.int64),
-        np.ascontiguousarray(values[strata.T].reshape(tile, tile, spp, 3)),
+        np.floor(place * SUBPIXELS).astype(np.int64), np.ascontiguousarray(values[strata.T].reshape(tile, tile, spp, 3))
     )
 
 

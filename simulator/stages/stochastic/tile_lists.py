@@ -74,11 +74,7 @@ class MovingLists(NamedTuple):
 
 
 def moving_lists(
-    visits: Visits,
-    tiles: int,
-    simt: Simt,
-    triangle_bytes: int = TRIANGLE_BYTES,
-    owners: NDArray[Any] | None = None,
+    visits: Visits, tiles: int, simt: Simt, triangle_bytes: int = TRIANGLE_BYTES, owners: NDArray[Any] | None = None
 ) -> StageResult[MovingLists]:
     """Make the lists from what the bounds found.
 
