@@ -11,14 +11,13 @@ Not modelled
 - Machine code: mixes are operations counted by hand, so its times compare algorithms and are no prediction of a GPU.
 """
 
-from typing import Any, ClassVar
-
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.across_polygons import Packing
 from tilestamp.simulator.stages.fatahalian2009.across_polygons import across_polygons as walk_boxes
@@ -36,13 +35,7 @@ class AcrossPolygonsOptions(MicropolygonInput, frozen=True, kw_only=True):
 
 
 def across_polygons(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: AcrossPolygonsOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: AcrossPolygonsOptions, execute: Executor
 ) -> Frame:
     """Micropolygons in parallel: a lane each, warps as long as their longest (Fatahalian et al. 2009)."""
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))

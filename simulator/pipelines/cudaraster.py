@@ -45,6 +45,7 @@ from tilestamp.simulator.pipelines._cudaraster_facts import (
 )
 from tilestamp.simulator.pipelines._cudaraster_image import frame_image, tile_maps
 from tilestamp.simulator.pipelines._cudaraster_rop import draw_by, reads_depth
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.laine2011 import bin_raster as bins
 from tilestamp.simulator.stages.laine2011 import coarse_raster as tiles
@@ -157,13 +158,7 @@ class _State:
 
 
 def cudaraster(
-    scene: Scene,
-    matrix: NDArray[np.floating],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: CudarasterOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: CudarasterOptions, execute: Executor
 ) -> Frame:
     """CudaRaster: setup, bins, tiles, pixels, in input order (Laine & Karras 2011).
 

@@ -25,6 +25,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.options import Options
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.liu2010.freepipe import BLOCK, Packing, freepipe_work
 from tilestamp.simulator.stages.liu2010.freepipe import freepipe as draw
@@ -65,13 +66,7 @@ class FreepipeOptions(Options, frozen=True, kw_only=True):
 
 
 def freepipe(
-    scene: Scene,
-    matrix: NDArray[np.floating],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: FreepipeOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: FreepipeOptions, execute: Executor
 ) -> Frame:
     """FreePipe: one thread a triangle, atomics on the frame buffer (Liu et al. 2010).
 

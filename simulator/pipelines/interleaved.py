@@ -13,16 +13,16 @@ Not modelled
 - Triangles have the price of quads. On an H200 the model is 1.7 to 3.2 times too fast (experiment ``ste/blur``).
 """
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import frame_of
 from tilestamp.simulator.pipelines._motion import MotionInput, moving_micropolygons, shade
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, empty_work, interleaved_pattern
 from tilestamp.simulator.stages.fatahalian2009.motion_interleaved import motion_interleaved
@@ -42,13 +42,7 @@ class InterleavedOptions(MotionInput, frozen=True, kw_only=True):
 
 
 def interleaved(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: InterleavedOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: InterleavedOptions, execute: Executor
 ) -> Frame:
     """Motion blur and defocus by interleaved sampling: a set-up for each time and lens point (Fatahalian 2009)."""
     pattern = interleaved_pattern(options.spp, options.tile)

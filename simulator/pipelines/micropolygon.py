@@ -27,7 +27,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.simt import Simt
@@ -36,6 +36,7 @@ from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.pipelines._micropolygon_hybrid import draw_grids
 from tilestamp.simulator.pipelines._micropolygon_options import MicropolygonOptions
 from tilestamp.simulator.pipelines._micropolygon_ways import diced, rasterized
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.eisenacher2010.bound_and_split import (
     SubPatches,
@@ -59,13 +60,7 @@ REMARKS = {
 
 
 def micropolygon(
-    scene: Scene,
-    matrix: ArrayLike,
-    width: int,
-    height: int,
-    simt: Simt,
-    options: MicropolygonOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: MicropolygonOptions, execute: Executor
 ) -> Frame:
     """Micropolygons from patches: split, dice, bucket, rasterize tiles (Eisenacher & Loop 2010).
 

@@ -24,6 +24,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.pipelines._micropolygons import MicropolygonInput, frame_of
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
@@ -71,13 +72,7 @@ class NonlinearOptions(MicropolygonInput, frozen=True, kw_only=True):
 
 
 def nonlinear(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: NonlinearOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: NonlinearOptions, execute: Executor
 ) -> Frame:
     """Fisheye, paraboloid and cylindrical pictures in tiles: a line of sight a sample, or tessellation."""
     samples = new_samples(width, height, sample_positions(options.spp, options.positions))

@@ -26,6 +26,7 @@ from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame
 from tilestamp.simulator.pipelines._micropolygons import frame_of
 from tilestamp.simulator.pipelines._motion import MotionInput
+from tilestamp.simulator.scenes.camera import Matrix
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.motion import blur_samples, stratified_pattern
@@ -64,13 +65,7 @@ class StochasticOptions(MotionInput, frozen=True, kw_only=True):
 
 
 def stochastic(
-    scene: Scene,
-    matrix: NDArray[Any],
-    width: int,
-    height: int,
-    simt: Simt,
-    options: StochasticOptions,
-    execute: Executor,
+    scene: Scene, matrix: Matrix, width: int, height: int, simt: Simt, options: StochasticOptions, execute: Executor
 ) -> Frame:
     """Motion blur and defocus in tiles: bounds over time and lens, a 5D edge test a sample (after Laine 2011)."""
     pattern, tile = stratified_pattern(options.spp, seed=options.sample_seed), options.tile

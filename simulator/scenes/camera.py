@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tilestamp.models.errors import TilestampError
 
+Matrix = NDArray[Any]  # (4, 4), from model to clip space, for column vectors
 FIT_FOV_DEGREES = 40.0  # vertical; a portrait lens, so that perspective shows but does not distort
 FIT_MARGIN = 1.05  # room left around a fitted model
 FIT_DIRECTION = (0.5, 0.35, 1.0)  # right, up, towards the eye: a three-quarter view from above

@@ -7,7 +7,6 @@ the lens position (Fatahalian et al. 2009; Cook et al. 1987). A sample is a plac
 point of the unit disc. The pattern of samples is a tile that repeats over the screen.
 """
 
-from dataclasses import replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -23,17 +22,16 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
-    blocks,
     count_hits,
     keep_nearest,
     new_samples,
 )
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
-WARPS = 4  # in a block
 STEPS = 64  # that a lane walks ahead before the others do
 CORNER_BYTES = 28  # start, end and circle of confusion of a vertex
 MOST_SAMPLES = 1024  # a pixel
@@ -177,25 +175,13 @@ def motion_work(
     kernel: str, table: NDArray[np.int64], polygons: MovingMicropolygons, samples: Samples, simt: Simt, *more: Stream
 ) -> Work:
     """Make the launch of either algorithm: persistent warps that draw polygons from a queue; ``more``: other loads."""
-    loaded = int(table[:, MotionEvent.LOAD_BYTES].sum()) - sum(stream.bytes for stream in more)
-    footprint = sum(array.nbytes for array in polygons)
-    written = int(table[:, MotionEvent.ATOMIC_REQUESTS].sum()) * 32
-    streams = (
-        Stream("micropolygons", "load", loaded, footprint),
-        *more,
-        Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
-    )
-    return replace(empty_work(kernel, simt), table=table, streams=streams, atomic_requests=samples.requests)
+    streams = sample_streams(sum(array.nbytes for array in polygons), samples, MotionEvent, table, *more)
+    return warp_queue(kernel, MotionEvent, table, simt, streams=streams, atomic_requests=samples.requests)
 
 
 def empty_work(kernel: str, simt: Simt) -> Work:
     """Launch of either algorithm, without rows."""
-    table = np.zeros((0, len(MotionEvent)), np.int64)
-    grid = blocks(simt, WARPS)
-    block = WARPS * simt.warp
-    return Work(
-        stage=kernel, kernel=kernel, events=MotionEvent, table=table, grid=grid, block=block, dispatch="warp_queue"
-    )
+    return warp_queue(kernel, MotionEvent, np.zeros((0, len(MotionEvent)), np.int64), simt)
 
 
 @kernel(lent=True)

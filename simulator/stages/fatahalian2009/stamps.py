@@ -14,18 +14,16 @@ import numpy as np
 
 from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
-from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import new_setup
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, blocks, draw_in_parts, units_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, units_of
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.stamps_chunk import draw_chunks
 from tilestamp.simulator.stages.fatahalian2009.stamps_events import CHUNK, StampsEvent, StampShape
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
 
 Touch = Literal["box", "polygon"]
-WARPS = 4  # in a block
 
 
 def stamp_shape(stamp: int | tuple[int, ...], touch: Touch, coarse: int = 0) -> StampShape:
@@ -55,25 +53,8 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
     units = -(-len(polygons.patch) // CHUNK)
     table = np.zeros((units, len(StampsEvent)), np.int64)
     draw_in_parts(_stamps, units, samples, polygons.vertices, shape, Simt(*map(int, simt)), table)
-    loaded = int(table[:, StampsEvent.LOAD_BYTES].sum())
-    written = int(table[:, StampsEvent.ATOMIC_REQUESTS].sum()) * 32
-    streams = (
-        Stream("micropolygons", "load", loaded, polygons.vertices.nbytes),
-        Stream("samples", "atomic", written, int(np.count_nonzero(samples.requests)) * 32),
-    )
-    grid = blocks(simt, WARPS)
-    work = Work(
-        stage="stamps",
-        kernel="stamps",
-        events=StampsEvent,
-        table=table,
-        grid=grid,
-        block=WARPS * simt.warp,
-        shared_bytes=0,
-        dispatch="warp_queue",
-        streams=streams,
-        atomic_requests=samples.requests,
-    )
+    streams = sample_streams(polygons.vertices.nbytes, samples, StampsEvent, table)
+    work = warp_queue("stamps", StampsEvent, table, simt, streams=streams, atomic_requests=samples.requests)
     return StageResult(samples, (work,))
 
 

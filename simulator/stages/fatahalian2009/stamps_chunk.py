@@ -3,7 +3,7 @@
 All samples of a stamp are tested by lanes of the warp; here only those in the polygon's box are looked at.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from tilestamp.models.coalescing import contiguous
 from tilestamp.models.kernel import kernel
@@ -23,6 +23,17 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Sampl
 from tilestamp.simulator.stages.fatahalian2009.stamps_events import CHUNK, StampsEvent, StampShape
 
 
+class Drawing(NamedTuple):
+    """What all polygons are drawn to, and by."""
+
+    samples: Samples
+    shape: StampShape
+    simt: Simt
+    corners: int  # of a polygon
+    setup: Any  # edges, boxes, depths, snapped corners of the polygon at hand
+    addresses: Any  # of the hits of a warp
+
+
 @kernel(lent=True)
 def draw_chunks(
     units: Any, samples: Samples, vertices: Any, shape: StampShape, simt: Simt, table: Any, setup: Any, addresses: Any
@@ -30,6 +41,7 @@ def draw_chunks(
     """Draw some chunks, a row of work each."""
     corners = vertices.shape[1]
     edges, boxes, depths, snapped = setup
+    to = Drawing(samples, shape, simt, corners, setup, addresses)
     for unit in units:
         row = table[unit]
         last = min(len(vertices), (unit + 1) * CHUNK)
@@ -46,9 +58,9 @@ def draw_chunks(
             if shape.coarse or shape.polygon or _near_sample(boxes, box, samples):  # else no test can hit
                 set_edges(vertices[p], edges, boxes, depths, snapped)
             if shape.coarse:
-                _two_levels(p, corners, setup, samples, shape, simt, row, addresses, box)
+                _two_levels(p, to, row, box)
             else:
-                _one_level(p, corners, setup, samples, shape, simt, row, addresses, box, box)
+                _one_level(p, to, row, box, box)
 
 
 @kernel(lent=True)
@@ -63,51 +75,31 @@ def _near_sample(boxes: Any, box: Any, samples: Samples) -> bool:
 
 
 @kernel(lent=True)
-def _two_levels(
-    p: int,
-    corners: Any,
-    setup: Any,
-    samples: Samples,
-    shape: StampShape,
-    simt: Simt,
-    row: Any,
-    addresses: Any,
-    box: Any,
-) -> None:
+def _two_levels(p: int, to: Drawing, row: Any, box: Any) -> None:
     """Sort the coarse stamps of a box into culled, filled, and those to be cut into stamps."""
-    edges, boxes, _, _ = setup
-    side = shape.coarse * STEP
+    edges, boxes, _, _ = to.setup
+    corners, shape, side = to.corners, to.shape, to.shape.coarse * STEP
     seen = 0
     for j in range(box[1] // side, box[3] // side + 1):
         for i in range(box[0] // side, box[2] // side + 1):
             x0, y0, x1, y1 = i * side, j * side, (i + 1) * side, (j + 1) * side
             seen += 1
             if fills(edges, corners, x0, y0, x1, y1):
-                _fill(p, setup, samples, simt, row, addresses, i * shape.coarse, j * shape.coarse, shape.coarse)
+                _fill(p, to, row, i * shape.coarse, j * shape.coarse, shape.coarse)
             elif touches(edges, boxes, corners, x0, y0, x1, y1):
                 part = (max(x0, box[0]), max(y0, box[1]), min(x1 - 1, box[2]), min(y1 - 1, box[3]))
-                _one_level(p, corners, setup, samples, shape, simt, row, addresses, part, box)
+                _one_level(p, to, row, part, box)
     row[StampsEvent.COARSE_STAMPS] += seen
-    row[StampsEvent.COARSE_WARPS] += -(-seen // simt.warp)
+    row[StampsEvent.COARSE_WARPS] += -(-seen // to.simt.warp)
 
 
 @kernel(lent=True)
-def _one_level(
-    p: int,
-    corners: Any,
-    setup: Any,
-    samples: Samples,
-    shape: StampShape,
-    simt: Simt,
-    row: Any,
-    addresses: Any,
-    part: Any,
-    box: Any,
-) -> None:
+def _one_level(p: int, to: Drawing, row: Any, part: Any, box: Any) -> None:
     """Test the stamps of a part of the polygon's box in row order, whole stamps to a warp where they fit."""
-    edges, boxes, _, _ = setup
+    edges, boxes, _, _ = to.setup
+    corners, shape, lanes = to.corners, to.shape, to.simt.warp
     wide, high = shape.width * STEP, shape.height * STEP
-    each = shape.width * shape.height * len(samples.offsets)
+    each = shape.width * shape.height * len(to.samples.offsets)
     looked, tested, warps = 0, 0, 0
     used, hits = 0, 0  # lanes of the warp that is being filled, and those of them that hit
     for j in range(part[1] // high, part[3] // high + 1):
@@ -117,45 +109,33 @@ def _one_level(
             if shape.polygon and not touches(edges, boxes, corners, x0, y0, x0 + wide, y0 + high):
                 continue
             tested += 1
-            if used + each > simt.warp:
+            if used + each > lanes:
                 warps += used > 0
-                hits = _end_warp(samples, simt, row, addresses, hits)
+                hits = _end_warp(to, row, hits)
                 used = 0
-            hits = _test_stamp(p, setup, samples, shape, simt, row, addresses, i, j, box, used, hits)
-            full = (used + each - 1) // simt.warp  # warps that the stamp's samples fill, and go on
+            hits = _test_stamp(p, to, row, i, j, box, used, hits)
+            full = (used + each - 1) // lanes  # warps that the stamp's samples fill, and go on
             warps += full
-            used += each - full * simt.warp
-    _end_warp(samples, simt, row, addresses, hits)
+            used += each - full * lanes
+    _end_warp(to, row, hits)
     row[StampsEvent.TEST_WARPS] += warps + (used > 0)
     row[StampsEvent.STAMPS] += tested
     row[StampsEvent.SAMPLE_TESTS] += tested * each
     row[StampsEvent.BOX_STAMPS] += looked
-    row[StampsEvent.BOX_WARPS] += -(-looked // simt.warp)
+    row[StampsEvent.BOX_WARPS] += -(-looked // lanes)
 
 
 @kernel(lent=True)
-def _test_stamp(
-    p: int,
-    setup: Any,
-    samples: Samples,
-    shape: StampShape,
-    simt: Simt,
-    row: Any,
-    addresses: Any,
-    i: int,
-    j: int,
-    box: Any,
-    used: int,
-    hits: int,
-) -> int:
+def _test_stamp(p: int, to: Drawing, row: Any, i: int, j: int, box: Any, used: int, hits: int) -> int:
     """Test the samples of one stamp, looking only where the polygon's box is; returns the hits of the last warp."""
-    edges, boxes, depths, _ = setup
+    edges, boxes, depths, _ = to.setup
+    samples, shape, lanes = to.samples, to.shape, to.simt.warp
     spp, left, top = len(samples.offsets), i * shape.width, j * shape.height
     right, bottom = min(left + shape.width, samples.width), min(top + shape.height, samples.height)
     for y in range(top, bottom):
         for x in range(left, right):
             samples.tests[y, x] += spp
-    end = simt.warp - used  # of the samples of the stamp in the warp that is being filled
+    end = lanes - used  # of the samples of the stamp in the warp that is being filled
     for y in range(max(top, box[1] >> STEP_BITS), min(bottom, (box[3] >> STEP_BITS) + 1)):
         for x in range(max(left, box[0] >> STEP_BITS), min(right, (box[2] >> STEP_BITS) + 1)):
             for s in range(spp):
@@ -167,28 +147,28 @@ def _test_stamp(
                     continue
                 at = ((y - top) * shape.width + x - left) * spp + s
                 if at >= end:
-                    hits = _end_warp(samples, simt, row, addresses, hits)
-                    end += (at - end) // simt.warp * simt.warp + simt.warp
+                    hits = _end_warp(to, row, hits)
+                    end += (at - end) // lanes * lanes + lanes
                 depth = depth_at(edges, depths, triangle, at_x, at_y)
-                addresses[hits] = keep_nearest(samples, x, y, s, depth, p)
+                to.addresses[hits] = keep_nearest(samples, x, y, s, depth, p)
                 hits += 1
     if shape.width * shape.height * spp > end:
-        hits = _end_warp(samples, simt, row, addresses, hits)
+        hits = _end_warp(to, row, hits)
     return hits
 
 
 @kernel(lent=True)
-def _end_warp(samples: Samples, simt: Simt, row: Any, addresses: Any, hits: int) -> int:
+def _end_warp(to: Drawing, row: Any, hits: int) -> int:
     """Count the atomics of the hits of one warp execution of the test; returns no hits."""
     if hits > 0:
         row[StampsEvent.SAMPLE_HITS] += hits
-        _count_hits(samples, addresses, hits, simt.atomic_merge, row)
+        _count_hits(to, hits, row)
     return 0
 
 
 @kernel(lent=True)
-def _count_hits(samples: Samples, addresses: Any, hits: int, merge: int, row: Any) -> None:
-    lanes, requests, _, depth = count_hits(samples, addresses, hits, merge)
+def _count_hits(to: Drawing, hits: int, row: Any) -> None:
+    lanes, requests, _, depth = count_hits(to.samples, to.addresses, hits, to.simt.atomic_merge)
     row[StampsEvent.HIT_WARPS] += 1
     row[StampsEvent.ATOMIC_LANES] += lanes
     row[StampsEvent.ATOMIC_REQUESTS] += requests
@@ -196,29 +176,27 @@ def _count_hits(samples: Samples, addresses: Any, hits: int, merge: int, row: An
 
 
 @kernel(lent=True)
-def _fill(
-    p: int, setup: Any, samples: Samples, simt: Simt, row: Any, addresses: Any, left: int, top: int, size: int
-) -> None:
+def _fill(p: int, to: Drawing, row: Any, left: int, top: int, size: int) -> None:
     """Write every sample of a coarse stamp that one triangle fills, a warp's worth at a time."""
-    edges, _, depths, _ = setup
-    used = 0
+    edges, _, depths, _ = to.setup
+    samples, used = to.samples, 0
     for y in range(top, min(top + size, samples.height)):
         for x in range(left, min(left + size, samples.width)):
             for s in range(len(samples.offsets)):
                 at_x, at_y = x * STEP + samples.offsets[s, 0], y * STEP + samples.offsets[s, 1]
                 triangle = covering_triangle(edges, at_x, at_y)
                 depth = depth_at(edges, depths, triangle, at_x, at_y)
-                addresses[used] = keep_nearest(samples, x, y, s, depth, p)
+                to.addresses[used] = keep_nearest(samples, x, y, s, depth, p)
                 used += 1
-                if used == simt.warp:
-                    used = _end_fill(samples, simt, row, addresses, used)
-    _end_fill(samples, simt, row, addresses, used)
+                if used == to.simt.warp:
+                    used = _end_fill(to, row, used)
+    _end_fill(to, row, used)
 
 
 @kernel(lent=True)
-def _end_fill(samples: Samples, simt: Simt, row: Any, addresses: Any, used: int) -> int:
+def _end_fill(to: Drawing, row: Any, used: int) -> int:
     if used > 0:
         row[StampsEvent.FILLED_SAMPLES] += used
         row[StampsEvent.FILLED_WARPS] += 1
-        _count_hits(samples, addresses, used, simt.atomic_merge, row)
+        _count_hits(to, used, row)
     return 0

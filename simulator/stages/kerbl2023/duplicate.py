@@ -183,21 +183,8 @@ def _duplicate(
                 if out.radii[i] > 0:
                     rows[lane] = _write(i, begins[lane], out, bound, tiles, shape, keys, values, widths[lane])
             if table is not None:
-                tight = bound != SQUARE
-                _count_warp(
-                    first,
-                    lanes,
-                    begins,
-                    sizes,
-                    rows,
-                    widths,
-                    out.radii,
-                    tight,
-                    active,
-                    shape.bytes,
-                    segment,
-                    table[block],
-                )
+                tight, size, row = bound != SQUARE, shape.bytes, table[block]
+                _count_warp(first, lanes, begins, sizes, rows, widths, out.radii, tight, active, size, segment, row)
         if table is not None:
             row = table[block]
             row[_E.BLOCKS] = 1
