@@ -66,7 +66,6 @@ def fullest_unit_ns(requests: NDArray[np.int64], dealing: Dealing) -> float:
 
 
 def _totals(owner: NDArray[np.int64], amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sum by owner."""
     return np.bincount(owner, amounts).astype(np.float64)
 
 

@@ -75,7 +75,6 @@ def _merged(process: Process, together: int) -> int:
 
 
 def _process(pid: int, process: Process, together: int) -> Iterator[str]:
-    """Lines of one process."""
     yield _named(pid, 0, "process_name", f"{pid} {process.name}")
     yield _named(pid, 0, "thread_name", "launch")
     for tid, name in process.threads.items():

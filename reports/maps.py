@@ -67,7 +67,6 @@ def value_map(
 
 
 def _panel(axes: "Axes", table: "pd.DataFrame", unit: str, log_x: bool, log_y: bool, top: float, extend: str) -> None:
-    """Draw one table."""
     x, y = _edges(table.columns, log_x), _edges(table.index, log_y)
     image = axes.pcolormesh(x, y, table.to_numpy(np.float64), cmap=HEAT, vmin=0, vmax=top)
     axes.grid(visible=False)

@@ -79,7 +79,6 @@ def _library() -> "Markup":
 
 
 def _section(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
-    """One result for the templates."""
     own = folder / row["name"]
     section: dict[str, Any] = json.loads((own / "result.json").read_text(encoding="utf-8"))
     compared = any(cell["published"] is not None for cell in section["cells"])

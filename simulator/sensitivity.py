@@ -151,7 +151,6 @@ def _ends(key: str, value: float) -> tuple[float, float]:
 
 
 def _rows(key: str, value: float, now: Times, changed: Mapping[float, Times]) -> list[dict[str, Any]]:
-    """A row a stage."""
     lower, higher = _ends(key, value)
     near = {other: changed.get(other) for other in (value * (1 - NEAR), value * (1 + NEAR))}
     ends = [(other, times) for other, times in near.items() if times is not None]

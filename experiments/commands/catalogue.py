@@ -71,7 +71,6 @@ def _options(pipeline: str, machine: str | None) -> Table:
 
 
 def _maps(pipeline: str) -> Table:
-    """Heat maps of a pipeline."""
     return {name: {"what": what} for name, what in options_type(pipeline).maps.items()}
 
 
@@ -85,7 +84,6 @@ def _numbers(machine: str) -> Table:
 
 
 def _views(scene: str) -> Table:
-    """Named views of a scene."""
     return {name: {"camera": _camera(view)} for name, view in load_scene(scene).views.items()}
 
 

@@ -125,7 +125,6 @@ class _Explained(NamedTuple):
 
 
 def _explained(run: Run, why: bool, tornado: Path | None, trace: Path | None, timeline: Path | None) -> _Explained:
-    """Write all that explains a run."""
     found = run.sensitivity() if why or tornado is not None else None
     lines = []
     if found is not None and tornado is not None:

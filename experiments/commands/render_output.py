@@ -75,7 +75,6 @@ def print_run(run: Run, output: Path | None, map_: str | None = None, columns: s
 
 
 def _shown_time(run: Run) -> str:
-    """Show the frame's milliseconds."""
     if not run.counted:
         return "nothing was counted, so there is no time"
     if run.fidelity == "counts":

@@ -55,7 +55,6 @@ def _table(*columns: str) -> Table:
 
 
 def _lines(rows: Sequence[Row]) -> Table:
-    """A line an experiment."""
     shown = [name for name in OTHERS if any(getattr(row, name) for row in rows)]
     table = _table(*HEAD, *(OTHERS[name] for name in shown))
     for group, some in _named(rows):

@@ -130,7 +130,6 @@ def _print_part(
     styles: Sequence[str],
     keys: int,
 ) -> None:
-    """Print some columns of a table."""
     from rich.table import Table
     from rich.text import Text
 

@@ -69,7 +69,6 @@ def bucketing(made: Run) -> Run:
 
 
 def _cells(line: "pd.Series[float]", made: Run) -> list[Cell]:
-    """Cells of one tile size."""
     tile = int(line.tile_size)
     written = made.frame.facts["patches_written"]
     per_patch = written / made.frame.facts["subpatches"]

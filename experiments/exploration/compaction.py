@@ -121,7 +121,6 @@ def _row(scene: Scene, reference: float) -> dict[str, float]:
 
 
 def _issued(price: dict[str, Any]) -> float:
-    """Warp instructions of an event."""
     return sum(float(price.get(kind.name.lower(), 0)) for kind in INSTRUCTION_CLASSES)
 
 

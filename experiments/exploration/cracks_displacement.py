@@ -115,7 +115,6 @@ def _bumps(height: float, bound: float) -> list[dict[str, Any]]:
 
 
 def _notes(cracks: pd.DataFrame, bumps: pd.DataFrame) -> list[str]:
-    """What each costs."""
     said = []
     for bound in BOUNDS:
         rows = cracks[cracks.bound == bound].set_index("cure")

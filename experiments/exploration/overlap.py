@@ -84,7 +84,6 @@ def run(progress: Progress) -> Result:
 
 
 def _row(way: Way, plain: Way, machine: str, cull: str, tile: int = 8, layers: int = 0) -> dict[str, Any]:
-    """Counts and times of one frame."""
     run = way.run(machine)
     counts = run.counts
     listed = counts.get(f"{RASTER}.LISTED", counts[f"{RASTER}.GRIDS"])
@@ -140,7 +139,6 @@ def _notes(ratios: pd.DataFrame) -> list[str]:
 
 
 def _times(ms: "pd.Series[float]") -> str:
-    """Times of a frame by way of culling."""
     return f"{ms['none']:.3g} ms, {ms['behind']:.3g} culled in list order, {ms['sorted']:.3g} sorted"
 
 

@@ -66,7 +66,6 @@ def run(progress: Progress) -> Result:
 
 
 def _row(way: Way, machine: str) -> dict[str, Any]:
-    """Counts and times of one frame."""
     run = way.run(machine)
     quads = diced_quads(run)
     return {
@@ -169,7 +168,6 @@ def _notes(table: pd.DataFrame, pays: dict[tuple[str, str], float]) -> list[str]
 
 
 def _on(machine: str, rows: pd.DataFrame, pays: dict[tuple[str, str], float]) -> str:
-    """All ways on one machine."""
     base = rows.loc[WAYS[0].name]
     return (
         f"On {machine} shading is {100 * base.shading_ms / base.ms:.0f} % of the published way's frame; "

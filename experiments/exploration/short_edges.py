@@ -77,7 +77,6 @@ def run(progress: Progress) -> Result:
 
 
 def _row(edges: str, bound: float, machine: str) -> dict[str, Any]:
-    """Cost and errors of one kind."""
     run, cover = teapot(edges, bound).run(machine), sheet(edges, bound).run(machine).frame.maps["overdraw"]
     return {
         "edges": edges,

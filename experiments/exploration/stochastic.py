@@ -124,7 +124,6 @@ def _single() -> int:
 
 
 def _cells(table: pd.DataFrame) -> list[Cell]:
-    """Time and efficiency of every run."""
     cells = []
     for r in table.to_dict("records"):
         name = f"{r['method']}, polygons of {r['edge']:g} px, motion {r['motion']:g} px, circle {r['lens']:g} px"

@@ -95,7 +95,6 @@ def _run(name: str, bound: float, machine: str) -> Run | None:
 
 
 def _row(run: Run, machine: str, bound: float, family: str, name: str) -> dict[str, Any]:
-    """Times and counts of one frame."""
     stages = run.stages
     return {
         "machine": machine,

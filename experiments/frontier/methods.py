@@ -131,7 +131,6 @@ def _run(subject: Subject, variant: Variant, machine: str) -> Run:
 
 
 def _row(drawn: Drawn) -> dict[str, Any]:
-    """Errors of one picture."""
     variant, frame = drawn.variant, drawn.run.frame
     row: dict[str, Any] = {
         "scene": drawn.subject.name,

@@ -102,7 +102,6 @@ def _pixels(table: pd.DataFrame) -> list[str]:
 
 
 def _depths(table: pd.DataFrame) -> list[str]:
-    """Depth errors of the formats."""
     first = table[(table.machine == table.machine.iloc[0]) & table.depth_median_ulp.notna()]
     grouped = first.groupby("method", sort=False)[["depth_median_ulp", "depth_worst_ulp"]]
     worst = grouped.agg({"depth_median_ulp": "median", "depth_worst_ulp": "max"})

@@ -140,7 +140,6 @@ def _detailed(instructions: float) -> pd.DataFrame:
 
 
 def _cells(ours: pd.DataFrame, theirs: pd.DataFrame) -> list[Cell]:
-    """What is drawn, as numbers."""
     shown = {
         "time to simulate a frame": ("cpu_seconds", "CPU s", 1),
         "mean error against the full run": ("error_against_full", "%", 100),

@@ -102,7 +102,6 @@ class _Row(NamedTuple):
 
 
 def _cell_of(r: _Row) -> Cell:
-    """A row of the table as a cell."""
     label = f"{r.scene} {r.W}" + (f" tile {r.tile}" if r.tile else "") + (f" spp {r.spp}" if r.spp else "")
     unit = "us" if r.quantity == TIME else ""
     column = f"{r.kernel} {r.quantity}"

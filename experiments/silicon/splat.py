@@ -138,7 +138,6 @@ def cells(table: pd.DataFrame) -> list[Cell]:
 
 
 def _cell(row: dict[str, Any]) -> Cell:
-    """A row of the table as a cell."""
     unit = "us" if row["quantity"] in {TIME, FRAME_TIME} else ""
     frame, column = f"{row['scene']} {row['config']}", f"{row['kernel']} {row['quantity']}"
     status: Status = "reproduced" if row["quantity"] == "instructions" and row["scene"] in MADE_FROM else "predicted"
@@ -148,5 +147,4 @@ def _cell(row: dict[str, Any]) -> Cell:
 
 
 def _frames(table: pd.DataFrame) -> Iterator[tuple[Any, pd.DataFrame]]:
-    """Frames of each scene."""
     yield from table[table.quantity == FRAME_TIME].groupby("scene", sort=False)

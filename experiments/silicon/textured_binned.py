@@ -51,7 +51,6 @@ def run(progress: Callable[[str], None]) -> Result:
 
 
 def _frames(progress: Callable[[str], None], measured: Measured) -> Iterator[dict[str, Any]]:
-    """Both frames of a scene."""
     for config in ("stream", "stream_textured"):
         progress(f"{measured.name} {config}")
         yield from _rows(measured, config)

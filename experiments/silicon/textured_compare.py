@@ -155,7 +155,6 @@ def cells(table: pd.DataFrame) -> list[Cell]:
 
 
 def _cell(r: dict[str, Any]) -> Cell:
-    """A row of the table as a cell."""
     row, column = f"{r['scene']} {r['config']}", f"{r['kernel']} {r['instance']} {r['quantity']}"
     unit = "us" if r["quantity"] in {TIME, FRAME_TIME, SPAN} else ""
     return Cell(row, column, unit, published=r["measured"], ours=r["ours"], aim=r["aim"], frame=r["scene"])

@@ -43,7 +43,6 @@ TITLE = "H200, Ru 2016's kernels, model against machine"
 
 
 def _rows(progress: Callable[[str], None], measured: Measured) -> Iterator[dict[str, Any]]:
-    """Each frame of a scene."""
     for drawn in drawn_frames(measured):
         progress(f"{measured.name} {drawn.config}")
         yield from rows(measured, drawn)

@@ -143,7 +143,6 @@ def _won(row: dict[str, Any]) -> str:
 
 
 def _cells(table: pd.DataFrame) -> Iterator[Cell]:
-    """Frames that were measured."""
     for row in table.dropna(subset=["measured"]).to_dict("records"):
         label = f"{row['scene']} {row['width']} {row['rule']}"
         yield Cell(label, f"tile {row['tile']}", "ms", published=row["measured"], ours=row["ms"], aim=0.2, frame=label)

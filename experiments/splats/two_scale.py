@@ -72,7 +72,6 @@ def times(table: pd.DataFrame, screen: str, values: str = "ms") -> pd.DataFrame:
 
 
 def _cells(table: pd.DataFrame) -> Iterator[Cell]:
-    """What was published, for each scene."""
     small, large = (times(table, screen) for screen in SCREENS)
     for scene, machine in small.index:
         if machine != PUBLISHED_ON:
@@ -89,7 +88,6 @@ def _cells(table: pd.DataFrame) -> Iterator[Cell]:
 
 
 def _answer(table: pd.DataFrame) -> str:
-    """How often, and by how much."""
     gains = pd.concat([best_of_one(times(table, screen)) for screen in SCREENS])
     lists = pd.concat([by_lists_alone(table, screen) for screen in SCREENS])
     return (

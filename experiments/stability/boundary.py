@@ -155,7 +155,6 @@ def _answer(boundaries: Sequence[Boundary]) -> str:
 
 
 def _where(boundary: Boundary) -> str:
-    """The first value that fails."""
     return f"{boundary.parameter} {boundary.breaks:.4g} {boundary.unit}".rstrip()
 
 

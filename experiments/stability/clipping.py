@@ -196,7 +196,6 @@ def clips(release: str, screens: float) -> bool:
 
 
 def _large_run(release: str, screens: float) -> Run:
-    """Draw one square by cudaraster."""
     scene = Scene.from_clip_space(_large(screens)[0], TWO_TRIANGLES)
     return draw(scene, "cudaraster", SIZE, release=release, cull_backfaces=False)
 

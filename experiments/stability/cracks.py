@@ -153,7 +153,6 @@ def _boundary(table: pd.DataFrame, cure: Cure) -> Boundary:
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """What is left."""
     small = table[(table.cure == "as published") & (table.bound <= 8)]
     left = {cure: int(table[table.cure == cure].crack_pixels.sum()) for cure in CURES}
     covered = sum(int((frame(BOUNDS[0], seed, "as published").hits > 0).sum()) for seed in SEEDS)

@@ -151,7 +151,6 @@ def _carrying_cost() -> str:
 
 
 def _notes(table: pd.DataFrame, slack: int) -> list[str]:
-    """Compare depths and tilts."""
     stepped = table[table.second == next(iter(WAYS))]
     at = stepped[stepped.range == RANGES[-1]].set_index("middle").holes
     lost = (

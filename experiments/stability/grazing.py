@@ -157,7 +157,6 @@ def _cost_of_finer() -> str:
 
 
 def _worst(table: pd.DataFrame) -> str:
-    """Name the largest errors."""
     worst = table.groupby("method", sort=False).error.max()
     return (
         "Largest error of depth at a covered sample: "

@@ -65,7 +65,6 @@ def _boundary(rival: str) -> Boundary:
 
 
 def _notes() -> list[str]:
-    """How time grows."""
     first, last = AREAS[-2], AREAS[-1]
     growth = {p: milliseconds(p, last) / milliseconds(p, first) for p in PIPELINES}
     return [

@@ -84,7 +84,6 @@ def boundary(name: str, failed: list[bool] | None = None) -> tuple[float | None,
 
 
 def _row(name: str, failed: list[bool]) -> Boundary:
-    """A row of the atlas."""
     found = boundary(name, failed)
     holes, doubles = defects(name, 0.0)
     wrong = f"seams are hit twice (on the samples: {doubles} double hits, {holes} holes)"

@@ -90,14 +90,12 @@ def boundary(name: str, distance: float, near: float = NEAR) -> tuple[float | No
 
 
 def _row(name: str, holds: float | None, breaks: float | None) -> Boundary:
-    """A row of the atlas."""
     parameter = f"separation at distance {TOLD:g}"
     cure = f"a near plane at {FARTHER_NEAR:g} instead of {NEAR:g}"
     return Boundary(name, parameter, "world units", holds, breaks, "the farther wall shows", cure, _gain(name))
 
 
 def _gain(name: str) -> str:
-    """What a near plane farther out gains."""
     _, breaks = boundary(name, TOLD, FARTHER_NEAR)
     return f"the separation then is {breaks:.2g}; what is nearer than {FARTHER_NEAR:g} is cut off"
 
@@ -120,5 +118,4 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 
 def _depth_bytes(run: Run) -> int:
-    """Bytes of depth read and written."""
     return sum(int(stream.bytes) for work in run.frame.works for stream in work.streams if stream.buffer == "depth")

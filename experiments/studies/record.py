@@ -65,7 +65,6 @@ class Recorded:
             yield name, self._of(stage, column)
 
     def _of(self, stage: str | None, column: str) -> Any:
-        """A column of a stage, or of the whole frame."""
         launches = [place for place, one in enumerate(self._prices.stages) if stage in (None, one)]
         if column in TIMES and launches:
             times = getattr(self._prices, TIMES[column])[self._place].tolist()

@@ -152,7 +152,6 @@ def run(progress: Callable[[str], None]) -> Result:
 
 
 def _table(frame: list[Node], path: tuple[str, ...]) -> pd.DataFrame:
-    """One row a node."""
     return pd.DataFrame(
         [
             {

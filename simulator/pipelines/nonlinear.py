@@ -114,7 +114,6 @@ def _sight(
     corners: NDArray[np.float32], to: Projection, samples: Samples, simt: Simt, options: NonlinearOptions,
     execute: Executor,
 ) -> None:  # fmt: skip
-    """Draw by lines of sight."""
     planes = edge_planes(corners, double=options.double)
     found = outlines(planes)
     bins, _, _ = execute(

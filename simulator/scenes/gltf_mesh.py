@@ -203,7 +203,6 @@ def _normals(
 
 
 def _join(parts: list[dict[str, Any]], textures: tuple[NDArray[np.uint8], ...]) -> Mesh:
-    """All parts as one mesh."""
     starts = np.cumsum([0] + [len(part["positions"]) for part in parts[:-1]])
     for part, start in zip(parts, starts, strict=True):
         part["triangles"] = part["triangles"] + np.int32(start)

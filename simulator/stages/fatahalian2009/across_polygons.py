@@ -92,7 +92,6 @@ def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing,
 def _across_polygons(
     part: int, parts: int, samples: Samples, vertices: Any, sort: bool, idle_to_refill: int, simt: Simt, table: Any
 ) -> None:
-    """Draw a share of the chunks."""
     lanes = (
         np.zeros((simt.warp, 6, 4), np.int64),  # edges
         np.zeros((simt.warp, 3, 4), np.int64),  # boxes

@@ -44,7 +44,6 @@ def _motion_interleaved(
     part: int, parts: int, samples: Samples, start: Any, end: Any, blur: Any, pattern: BlurPattern, simt: Simt,
     table: Any,
 ) -> None:  # fmt: skip
-    """Draw a share of the warps."""
     scratch = new_setup(), np.empty(start.shape[1:], np.float32)
     steps = np.zeros(STEPS, np.int64), np.empty((STEPS, simt.warp), np.int64)  # hits, and their addresses
     _draw_warps(units_of(part, parts, len(table)), start, end, blur, pattern, samples, simt, scratch, steps, table)

@@ -60,6 +60,5 @@ def stamps(polygons: Micropolygons, samples: Samples, shape: StampShape, simt: S
 
 @kernel
 def _stamps(part: int, parts: int, samples: Samples, vertices: Any, shape: StampShape, simt: Simt, table: Any) -> None:
-    """Draw a share of the chunks."""
     scratch = new_setup(), np.empty(simt.warp, np.int64)
     draw_chunks(units_of(part, parts, len(table)), samples, vertices, shape, simt, table, *scratch)

@@ -76,7 +76,6 @@ def load_entries(first: int, count: int, listed: Any, out: Projected, colours: A
 def _tile(
     tile: int, tiles: Tiles, block: Block, count: int, background: Any, room: Room, pixels: Pixels, row: Any
 ) -> None:  # fmt: skip
-    """Blend the list of one tile."""
     rounds = (count + block.threads - 1) // block.threads
     room.rounds[:, :, :rounds] = 0
     room.totals[:] = 0

@@ -165,7 +165,6 @@ def _duplicate(
     part: int, parts: int, out: Projected, ends: Any, bound: int, tiles: Tiles, shape: Keys, warp: int, segment: int,
     keys: Any, values: Any, table: Any,
 ) -> None:  # fmt: skip
-    """Write the pairs of a part of the blocks."""
     count = len(ends)
     blocks = (count + BLOCK - 1) // BLOCK
     rows, active = np.zeros(warp, np.int64), np.zeros(warp, np.int64)

@@ -153,7 +153,6 @@ def _project(
     part: int, parts: int, means: Any, scales: Any, rotations: Any, opacities: Any, lens: Lens, tiles: Tiles,
     warp: int, segment: int, out: Any, space: Any, table: Any,
 ) -> None:  # fmt: skip
-    """Project a part of the blocks."""
     count = len(means)
     blocks = (count + BLOCK - 1) // BLOCK
     reached, active = np.zeros(warp, np.int64), np.zeros(warp, np.int64)

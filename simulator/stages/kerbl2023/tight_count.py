@@ -42,7 +42,6 @@ def _count(i: int, out: Projected, bound: int, tiles: Tiles, counts: Any) -> Any
 def _tight_count(
     part: int, parts: int, out: Projected, bound: int, tiles: Tiles, warp: int, segment: int, counts: Any, table: Any
 ) -> None:
-    """Count the tiles of a part of the blocks."""
     count = len(counts)
     active = np.zeros(warp, np.int64)
     blocks = (count + BLOCK - 1) // BLOCK

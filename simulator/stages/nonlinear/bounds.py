@@ -111,7 +111,6 @@ def _look(
     part: int, parts: int, axes: Any, spread: Any, inward: Any, triangles: Any, looked: Any, squares: Any, starts: Any,
     mask: int, tiles: Any, masks: Any,
 ) -> None:  # fmt: skip
-    """Look at the squares of a share of the triangles."""
     angles = squares[:, 3] + MARGIN
     turns = np.stack((np.sin(angles), np.cos(angles)), axis=1)
     _, threads, most = looked.shape

@@ -168,7 +168,6 @@ def _sample_raster(
     part: int, parts: int, corners: Any, aperture: Any, focus: Any, starts: Any, entries: Any, masks: Any, place: Any,
     time_lens: Any, whole: Any, rays: Any, volumes: Any, samples: Samples, tile: int, warp: int, events: Any,
 ) -> None:  # fmt: skip
-    """Draw a share of the rows of tiles."""
     rows, columns = (samples.height + tile - 1) // tile, (samples.width + tile - 1) // tile
     warps, spp = (tile * tile + warp - 1) // warp, len(samples.offsets)
     scratch = (

@@ -68,7 +68,6 @@ def _coarse_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, boxes: Any, starts: Any, queue: Any, columns: int, warp: int,
     margin: int, counts: Any, rooms: Any, appended: Any, events: Any,
 ) -> None:  # fmt: skip
-    """A part of the bins."""
     for i in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         x, y = i % columns, i // columns
         b = x + y * BINS_A_ROW

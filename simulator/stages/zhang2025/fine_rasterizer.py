@@ -55,7 +55,6 @@ def _fine_rasterizer(
     part: int, parts: int, edges: Any, planes: Any, starts: Any, entries: Any, tile_columns: int, warp: int,
     early_z: bool, optimized: bool, masks: Any, depth: Any, events: Any,
 ) -> None:  # fmt: skip
-    """Rasterize a part of the rows of tiles."""
     for row in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         for column in range(events.shape[1]):
             i = row * tile_columns + column

@@ -91,7 +91,6 @@ def _pixel_shader(
     part: int, parts: int, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any, chains: Any,
     method: int, opacity: Any, rule: int, merge: int, width: int, colors: Any, events: Any,
 ) -> None:  # fmt: skip
-    """Shade a part of the blocks that have fragments."""
     blocks = (len(quads) + BLOCK // 4 - 1) // (BLOCK // 4)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         shade_block(
@@ -105,7 +104,6 @@ def _pixel_shader_planes(
     part: int, parts: int, fragments: Any, quads: Any, places: Any, queue: Any, planes: Any, ids: Any, texture_ids: Any,
     chains: Any, method: int, opacity: Any, rule: int, merge: int, width: int, colors: Any, events: Any,
 ) -> None:  # fmt: skip
-    """Shade a part of the blocks that have fragments, without quads."""
     blocks = (len(fragments) + BLOCK - 1) // BLOCK
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         shade_fragments(

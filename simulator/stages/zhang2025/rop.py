@@ -48,7 +48,6 @@ def _rop(
     part: int, parts: int, heads: Any, links: Any, fragments: Any, primitives: Any, columns: int, warp: int,
     order: int, way: int, limit: int, depth: Any, resolved: Any, events: Any,
 ) -> None:  # fmt: skip
-    """Resolve a part of the blocks."""
     keys = np.empty((limit, 4), np.int64)
     for block in range(part * len(events) // parts, (part + 1) * len(events) // parts):
         left, bottom = block % columns * BLOCK_SIDE, block // columns * BLOCK_SIDE

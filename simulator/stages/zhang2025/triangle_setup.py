@@ -48,7 +48,6 @@ class TriangleSetupData(NamedTuple):
 
 @kernel(error_model="numpy", lent=True)
 def _setup(screen: Any, varyings: Any, edges: Any, planes: Any, box: Any) -> None:
-    """Set up one primitive."""
     for k in range(3):
         p, q = screen[(k + 1) % 3], screen[(k + 2) % 3]
         edges[k, 0] = p[1] - q[1]
