@@ -19,12 +19,12 @@ from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
-    count_hits,
+    count_hit_warp,
     draw_in_parts,
-    keep_nearest,
+    hit_sample,
     pixel_box,
     units_of,
 )
@@ -179,22 +179,13 @@ def _step(samples: Samples, lanes: Any, simt: Simt, row: Any, addresses: Any) ->
         x, y = walk[lane, 0] + pixel % wide, walk[lane, 1] + pixel // wide
         samples.tests[y, x] += 1
         at_x, at_y = x * STEP + samples.offsets[s, 0], y * STEP + samples.offsets[s, 1]
-        triangle = covering_triangle(edges[lane], at_x, at_y)
-        if triangle >= 0:
-            depth = depth_at(edges[lane], depths[lane], triangle, at_x, at_y)
-            addresses[hits] = keep_nearest(samples, x, y, s, depth, polygon[lane])
-            hits += 1
+        addresses[hits] = hit_sample(edges[lane], depths[lane], samples, x, y, s, at_x, at_y, polygon[lane])
+        hits += addresses[hits] >= 0
         walk[lane, 4] += 1
         if walk[lane, 4] == wide * (walk[lane, 3] - walk[lane, 1] + 1) * spp:
             polygon[lane] = -1
     if active:
         row[AcrossPolygonsEvent.TEST_WARPS] += 1
         row[AcrossPolygonsEvent.SAMPLE_TESTS] += active
-    if hits:
-        row[AcrossPolygonsEvent.SAMPLE_HITS] += hits
-        row[AcrossPolygonsEvent.HIT_WARPS] += 1
-        active_lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
-        row[AcrossPolygonsEvent.ATOMIC_LANES] += active_lanes
-        row[AcrossPolygonsEvent.ATOMIC_REQUESTS] += requests
-        row[AcrossPolygonsEvent.ATOMIC_CONFLICTS] += conflicts
-        row[AcrossPolygonsEvent.ATOMIC_DEPTH] += depth
+    event = AcrossPolygonsEvent
+    count_hit_warp(samples, addresses, hits, simt, row, event.SAMPLE_HITS, event.ATOMIC_LANES)

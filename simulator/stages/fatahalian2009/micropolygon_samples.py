@@ -15,7 +15,7 @@ from tilestamp.models.atomics import add_requests, count_atomics
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, STEP_BITS, covering_triangle, depth_at
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 
 WORD_BYTES = 8  # depth and polygon
@@ -119,6 +119,33 @@ def count_hits(samples: Samples, addresses: Any, hits: int, merge: int) -> Any:
     counts = count_atomics(addresses, hits, merge)
     add_requests(addresses, hits, merge, 0, samples.requests)
     return counts
+
+
+@kernel(lent=True)
+def hit_sample(
+    edges: Any, depths: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any, polygon: int
+) -> Any:
+    """Test a sample of the polygon that is set up; returns the byte address of a hit's atomic, -1 for none."""
+    triangle = covering_triangle(edges, at_x, at_y)
+    if triangle < 0:
+        return -1
+    return keep_nearest(samples, x, y, s, depth_at(edges, depths, triangle, at_x, at_y), polygon)
+
+
+@kernel(lent=True)
+def count_hit_warp(
+    samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any, sample_hits: int, atomic_lanes: int
+) -> None:
+    """Count one warp execution of depth and atomic, if it has hits.
+
+    Columns of the row: from ``sample_hits`` on hits and executions, from ``atomic_lanes`` on what ``count_hits`` gives.
+    """
+    if hits:
+        row[sample_hits] += hits
+        row[sample_hits + 1] += 1
+        counts = count_hits(samples, addresses, hits, simt.atomic_merge)
+        for k in range(4):
+            row[atomic_lanes + k] += counts[k]
 
 
 @kernel(lent=True)

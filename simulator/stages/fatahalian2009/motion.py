@@ -19,13 +19,8 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import covering_triangle, depth_at, set_up
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
-    Samples,
-    count_hits,
-    keep_nearest,
-    new_samples,
-)
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import set_up
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, count_hit_warp, new_samples
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
@@ -198,14 +193,7 @@ def begin_warp(first: int, last: int, corners: int, simt: Simt, row: Any) -> Non
 @kernel(lent=True)
 def count_atomic(samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
     """Count the atomics of the hits of one warp execution of the sample test."""
-    if hits:
-        row[MotionEvent.SAMPLE_HITS] += hits
-        row[MotionEvent.HIT_WARPS] += 1
-        lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
-        row[MotionEvent.ATOMIC_LANES] += lanes
-        row[MotionEvent.ATOMIC_REQUESTS] += requests
-        row[MotionEvent.ATOMIC_CONFLICTS] += conflicts
-        row[MotionEvent.ATOMIC_DEPTH] += depth
+    count_hit_warp(samples, addresses, hits, simt, row, MotionEvent.SAMPLE_HITS, MotionEvent.ATOMIC_LANES)
 
 
 @kernel(lent=True)
@@ -216,15 +204,6 @@ def put(start: Any, end: Any, blur: Any, p: int, time: Any, u: Any, v: Any, poly
             polygon[k, d] = start[p, k, d] + time * (end[p, k, d] - start[p, k, d])
         polygon[k, 0] += blur[p, k] * u
         polygon[k, 1] += blur[p, k] * v
-
-
-@kernel(lent=True)
-def hit_sample(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> Any:
-    """Test a sample of the polygon that is set up; returns the byte address of a hit's atomic, -1 for none."""
-    triangle = covering_triangle(setup[0], at_x, at_y)
-    if triangle < 0:
-        return -1
-    return keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
 
 
 @kernel(lent=True)

@@ -14,7 +14,13 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, in_box, new_setup, set_edges, snap
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, pixel_box, units_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    draw_in_parts,
+    hit_sample,
+    pixel_box,
+    units_of,
+)
 from tilestamp.simulator.stages.fatahalian2009.motion import (
     STEPS,
     BlurPattern,
@@ -22,7 +28,6 @@ from tilestamp.simulator.stages.fatahalian2009.motion import (
     MovingMicropolygons,
     begin_warp,
     count_atomic,
-    hit_sample,
     motion_table,
     motion_work,
     put,
@@ -107,7 +112,7 @@ def _walk(
             if not ready:
                 set_edges(polygon, edges, boxes, depths, snapped)
                 ready = True
-            addresses[step, hits[step]] = hit_sample(p, scratch[0], samples, x, y, s, at_x, at_y)
+            addresses[step, hits[step]] = hit_sample(edges, depths, samples, x, y, s, at_x, at_y, p)
             hits[step] += addresses[step, hits[step]] >= 0
         x += tile
         if x > x1:

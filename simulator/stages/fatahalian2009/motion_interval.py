@@ -17,7 +17,7 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, in_box, new_setup, set_edges, snap
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, units_of
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, draw_in_parts, hit_sample, units_of
 from tilestamp.simulator.stages.fatahalian2009.motion import (
     STEPS,
     BlurPattern,
@@ -25,7 +25,6 @@ from tilestamp.simulator.stages.fatahalian2009.motion import (
     MovingMicropolygons,
     begin_warp,
     count_atomic,
-    hit_sample,
     motion_table,
     motion_work,
     put,
@@ -190,7 +189,7 @@ def _walk(
             snap(polygon, setup[1], setup[3])
             if in_box(setup[1], at_x, at_y):
                 set_edges(polygon, setup[0], setup[1], setup[2], setup[3])
-                addresses[step, hits[step]] = hit_sample(p, setup, samples, x, y, s, at_x, at_y)
+                addresses[step, hits[step]] = hit_sample(setup[0], setup[2], samples, x, y, s, at_x, at_y, p)
                 hits[step] += addresses[step, hits[step]] >= 0
         s += 1
         if s == high:

@@ -11,15 +11,13 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     STEP_BITS,
-    covering_triangle,
-    depth_at,
     fills,
     in_box,
     set_edges,
     snap,
     touches,
 )
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, count_hits, keep_nearest, on_screen
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, count_hits, hit_sample, on_screen
 from tilestamp.simulator.stages.fatahalian2009.stamps_events import CHUNK, StampsEvent, StampShape
 
 
@@ -142,15 +140,14 @@ def _test_stamp(p: int, to: Drawing, row: Any, i: int, j: int, box: Any, used: i
                 at_x, at_y = x * STEP + samples.offsets[s, 0], y * STEP + samples.offsets[s, 1]
                 if not in_box(boxes, at_x, at_y):
                     continue
-                triangle = covering_triangle(edges, at_x, at_y)
-                if triangle < 0:
+                address = hit_sample(edges, depths, samples, x, y, s, at_x, at_y, p)
+                if address < 0:
                     continue
                 at = ((y - top) * shape.width + x - left) * spp + s
                 if at >= end:
                     hits = _end_warp(to, row, hits)
                     end += (at - end) // lanes * lanes + lanes
-                depth = depth_at(edges, depths, triangle, at_x, at_y)
-                to.addresses[hits] = keep_nearest(samples, x, y, s, depth, p)
+                to.addresses[hits] = address
                 hits += 1
     if shape.width * shape.height * spp > end:
         hits = _end_warp(to, row, hits)
@@ -184,9 +181,7 @@ def _fill(p: int, to: Drawing, row: Any, left: int, top: int, size: int) -> None
         for x in range(left, min(left + size, samples.width)):
             for s in range(len(samples.offsets)):
                 at_x, at_y = x * STEP + samples.offsets[s, 0], y * STEP + samples.offsets[s, 1]
-                triangle = covering_triangle(edges, at_x, at_y)
-                depth = depth_at(edges, depths, triangle, at_x, at_y)
-                to.addresses[used] = keep_nearest(samples, x, y, s, depth, p)
+                to.addresses[used] = hit_sample(edges, depths, samples, x, y, s, at_x, at_y, p)
                 used += 1
                 if used == to.simt.warp:
                     used = _end_fill(to, row, used)

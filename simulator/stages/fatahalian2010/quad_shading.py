@@ -22,11 +22,10 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     STEP_BITS,
     covering_triangle,
-    depth_at,
     new_setup,
     set_up,
 )
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest, on_screen
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, hit_sample, on_screen
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import warp_queue
 from tilestamp.simulator.stages.fatahalian2010.merge_buffer import PIXELS, MergeBuffer, find, join, new_buffer, start
@@ -162,11 +161,8 @@ def _visible(p: int, setup: Any, samples: Samples, i: int, j: int, covers: Any, 
             continue
         for s in range(spp):
             at_x, at_y = x * STEP + samples.offsets[s, 0], y * STEP + samples.offsets[s, 1]
-            triangle = covering_triangle(setup[0], at_x, at_y)
-            if triangle < 0:
-                continue
-            keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
-            if samples.polygon[(y * samples.width + x) * spp + s] == p:
+            hit = hit_sample(setup[0], setup[2], samples, x, y, s, at_x, at_y, p) >= 0
+            if hit and samples.polygon[(y * samples.width + x) * spp + s] == p:
                 mask |= np.uint64(1) << np.uint64(k * spp + s)
                 row[QuadEvent.SAMPLE_HITS] += 1
     return mask

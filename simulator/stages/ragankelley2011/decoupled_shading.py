@@ -25,10 +25,9 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import (
     STEP,
     covering_triangle,
-    depth_at,
     new_setup,
 )
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, keep_nearest
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, hit_sample
 from tilestamp.simulator.stages.fatahalian2009.motion import BlurPattern, MovingMicropolygons, set_up_at
 from tilestamp.simulator.stages.fatahalian2009.motion_interval import EVERYTHING, bound
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import warp_queue
@@ -160,11 +159,8 @@ def _decoupled_shading(
 @kernel
 def _visible(p: int, setup: Any, samples: Samples, x: int, y: int, s: int, at_x: Any, at_y: Any) -> bool:
     """Whether the polygon that is set up covers a sample and is the nearest there so far; it is noted then."""
-    triangle = covering_triangle(setup[0], at_x, at_y)
-    if triangle < 0:
-        return False
-    keep_nearest(samples, x, y, s, depth_at(setup[0], setup[2], triangle, at_x, at_y), p)
-    return bool(samples.polygon[(y * samples.width + x) * len(samples.offsets) + s] == p)
+    hit = hit_sample(setup[0], setup[2], samples, x, y, s, at_x, at_y, p) >= 0
+    return bool(hit and samples.polygon[(y * samples.width + x) * len(samples.offsets) + s] == p)
 
 
 @kernel

@@ -27,7 +27,7 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import STEP, covering_triangle, depth_at, set_up
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
-    count_hits,
+    count_hit_warp,
     draw_in_parts,
     keep_nearest,
     pixel_box,
@@ -204,14 +204,8 @@ def _step(
     if active:
         row[BitMaskEvent.TEST_WARPS] += 1
         row[BitMaskEvent.SAMPLE_TESTS] += active
+    count_hit_warp(samples, addresses, hits, simt, row, BitMaskEvent.SAMPLE_HITS, BitMaskEvent.ATOMIC_LANES)
     if hits:
-        row[BitMaskEvent.SAMPLE_HITS] += hits
-        row[BitMaskEvent.HIT_WARPS] += 1
-        active_lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
-        row[BitMaskEvent.ATOMIC_LANES] += active_lanes
-        row[BitMaskEvent.ATOMIC_REQUESTS] += requests
-        row[BitMaskEvent.ATOMIC_CONFLICTS] += conflicts
-        row[BitMaskEvent.ATOMIC_DEPTH] += depth
         _write_mask(mask, words, bits, hits, shared, row)
     return active > 0
 
