@@ -55,19 +55,24 @@ def clip(vertices):
             continue
         for sign in (1, -1):
             plane = [rn(v0[3] + sign * v0[axis]), rn(d1[3] + sign * d1[axis]), rn(d2[3] + sign * d2[axis])]
-            values = [fma(plane[2], b[1], fma(plane[1], b[0], plane[0])) for b in polygon]
-            kept = []
-            for i in range(len(polygon)):
-                a, b, av, bv = polygon[i - 1], polygon[i], values[i - 1], values[i]
-                if av * bv < 0:
-                    t = rn(av / rn(av - bv))
-                    s = rn(1 - t)
-                    kept.append(tuple(fma(s, p, rn(t * q)) for p, q in zip(a, b, strict=True)))
-                if bv >= 0:
-                    kept.append(b)
-            polygon = kept if len(kept) >= 3 else []
+            polygon = cut(polygon, plane)
     points = [tuple(fma(e, b[1], fma(d, b[0], v)) for v, d, e in zip(v0, d1, d2, strict=True)) for b in polygon]
     return [(points[0], points[i - 1], points[i]) for i in range(2, len(points))]
+
+
+def cut(polygon, plane):
+    """Clip a polygon at one plane, in barycentrics and float32."""
+    values = [fma(plane[2], b[1], fma(plane[1], b[0], plane[0])) for b in polygon]
+    kept = []
+    for i in range(len(polygon)):
+        a, b, av, bv = polygon[i - 1], polygon[i], values[i - 1], values[i]
+        if av * bv < 0:
+            t = rn(av / rn(av - bv))
+            s = rn(1 - t)
+            kept.append(tuple(fma(s, p, rn(t * q)) for p, q in zip(a, b, strict=True)))
+        if bv >= 0:
+            kept.append(b)
+    return kept if len(kept) >= 3 else []
 
 
 def subtriangles(vertices, width, height, release):

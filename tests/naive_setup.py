@@ -82,23 +82,8 @@ def walked(vertices):
             steps.append(len(polygon) if needed and len(polygon) >= 3 else 0)
             if needed:
                 plane = [naive.rn(c[3] + sign * c[axis]) for c in (v0, d1, d2)]
-                polygon = cut(polygon, plane)
+                polygon = naive.cut(polygon, plane)
     return tuple(steps)
-
-
-def cut(polygon, plane):
-    """One plane, in barycentrics and float32, as ``naive_cudaraster.clip`` does it."""
-    values = [naive.fma(plane[2], b[1], naive.fma(plane[1], b[0], plane[0])) for b in polygon]
-    kept = []
-    for i in range(len(polygon)):
-        a, b, av, bv = polygon[i - 1], polygon[i], values[i - 1], values[i]
-        if av * bv < 0:
-            t = naive.rn(av / naive.rn(av - bv))
-            s = naive.rn(1 - t)
-            kept.append(tuple(naive.fma(s, p, naive.rn(t * q)) for p, q in zip(a, b, strict=True)))
-        if bv >= 0:
-            kept.append(b)
-    return kept if len(kept) >= 3 else []
 
 
 def setup_counts(positions, triangles, width, height, release, samples, simt, *, depth=True, interpolate=True):

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from tilestamp.experiments.frontier.methods_scenes import grid_triangles
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result, reported
 from tilestamp.experiments.studies_shipped.finding import finding
@@ -36,9 +37,7 @@ def foliage(feature: int, layers: int, seed: int = 7) -> Scene:
     """Make sheets over the whole screen with an alpha at random in each corner, one in front of the other."""
     random, n = np.random.default_rng(seed), SIDE // feature + 1
     x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
-    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
-    a, b, c, d = corner, corner + 1, corner + n, corner + n + 1
-    one = np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3)
+    one = grid_triangles(n, n)
     positions = np.ones((layers, n * n, 4), np.float32)
     positions[..., 0], positions[..., 1] = x.ravel(), y.ravel()
     positions[..., 2] = np.linspace(0.8, 0.2, layers)[:, None]

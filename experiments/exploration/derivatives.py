@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tilestamp.experiments.frontier.methods_scenes import Subject, textured_subject
+from tilestamp.experiments.frontier.methods_scenes import Subject, grid_triangles, textured_subject
 from tilestamp.experiments.frontier.methods_truth import Truth
 from tilestamp.experiments.harness.registry import Progress
 from tilestamp.experiments.harness.result import Figure, Result, reported
@@ -34,9 +34,7 @@ def floor(tilt: float, area: float) -> Subject:
     w = 1.0 / (1.0 + tilt * y)
     uvs = coordinates(x, w).reshape(-1, 2).astype(np.float32)
     positions = np.stack([x * w, y * w, 0 * w, w], axis=-1).reshape(-1, 4).astype(np.float32)
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
-    triangles = np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3).astype(np.int32)
+    triangles = grid_triangles(columns, rows)
     textured = textured_subject().scene.mesh
     assert textured is not None  # noqa: S101 - made just so
     normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(positions), 1))

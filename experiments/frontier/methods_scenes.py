@@ -99,10 +99,7 @@ def lattice() -> Subject:
     x, y = np.meshgrid(np.arange(-3.5, width + 4, 4), np.arange(-3.5, height + 4, 4))
     positions = np.ones((x.size, 4), np.float32)
     positions[:, 0], positions[:, 1], positions[:, 2] = 2 * x.ravel() / width - 1, 2 * y.ravel() / height - 1, 0
-    columns, rows = x.shape[1], x.shape[0]
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
-    triangles = np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3).astype(np.int32)
+    triangles = grid_triangles(x.shape[1], x.shape[0])
     colors = np.ones((x.size, 4), np.float32)
     return Subject("lattice", _scene("lattice", positions, triangles, colors), width, height, np.eye(4))
 
@@ -139,17 +136,17 @@ def _sheet(
     clip = np.stack([u * w, v * w, z * w, w], axis=-1).reshape(-1, 4)
     light = 0.55 + 0.3 * np.cos(9.0 * u) * np.cos(9.0 * v) + random.uniform(-0.15, 0.15, u.shape)
     colors = np.concatenate([light[..., None] * np.array(color), np.ones((*u.shape, 1))], axis=-1).reshape(-1, 4)
-    triangles = _grid_triangles(len(steps))
+    triangles = grid_triangles(len(steps), len(steps))
     near = np.abs(pixels.reshape(-1, 2)) <= np.array([width, height]) / 2.0 + 2.0 * leg
     kept = near.all(axis=1)[triangles].all(axis=1)
     return clip, np.clip(colors, 0.0, 1.0), triangles[kept]
 
 
-def _grid_triangles(side: int) -> NDArray[np.int64]:
-    """Two counter-clockwise triangles for each cell of a grid of side x side vertices, row by row."""
-    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
-    a, b, c, d = corner, corner + 1, corner + side, corner + side + 1
-    return np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3)
+def grid_triangles(columns: int, rows: int) -> NDArray[np.int32]:
+    """Two counter-clockwise triangles for each cell of a grid of vertices, row by row: (T, 3) int32."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
+    return np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3).astype(np.int32)
 
 
 def _scene(

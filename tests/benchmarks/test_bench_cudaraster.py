@@ -37,12 +37,18 @@ def _surface(name, n, axes):
 
 
 @pytest.mark.parametrize("counting", [True, False])
-@pytest.mark.parametrize("triangles", [10_000, 100_000, 1_000_000, 4_800_000])
-def test_cudaraster_1600x1200(benchmark, scaled, triangles, counting):
+@pytest.mark.parametrize(
+    ("pipeline", "options", "triangles"),
+    [
+        *((cudaraster, CudarasterOptions(), count) for count in (10_000, 100_000, 1_000_000, 4_800_000)),
+        (freepipe, FreepipeOptions(), 1_000_000),
+    ],
+)
+def test_a_sphere_1600x1200(benchmark, scaled, pipeline, options, triangles, counting):
     scene = sphere(scaled(triangles))
 
     def draw():
-        return cudaraster(scene, np.eye(4), 1600, 1200, Simt(), CudarasterOptions(), Executor(counting=counting))
+        return pipeline(scene, np.eye(4), 1600, 1200, Simt(), options, Executor(counting=counting))
 
     frame = benchmark.pedantic(draw, rounds=3, warmup_rounds=1)
     assert (frame.triangle_ids >= 0).sum() > 900_000
@@ -56,17 +62,6 @@ def test_triangle_setup_of_a_million(benchmark, scaled, counting):
         triangle_setup, (mesh.positions, mesh.triangles, 1600, 1200, Simt()), given, rounds=5, warmup_rounds=1
     )
     assert found.outputs.subtriangles.any()
-
-
-@pytest.mark.parametrize("counting", [True, False])
-def test_freepipe_1600x1200(benchmark, scaled, counting):
-    scene = sphere(scaled(1_000_000))
-
-    def draw():
-        return freepipe(scene, np.eye(4), 1600, 1200, Simt(), FreepipeOptions(), Executor(counting=counting))
-
-    frame = benchmark.pedantic(draw, rounds=3, warmup_rounds=1)
-    assert (frame.triangle_ids >= 0).sum() > 900_000
 
 
 def test_memory_of_five_million_triangles(benchmark, scaled):

@@ -12,32 +12,20 @@ from tilestamp.simulator.scenes.library import load_scene
 pytestmark = pytest.mark.benchmark(group="textured")
 
 
-def timed(benchmark, pipeline, options, name, size, machine):
-    scene = load_scene(name, kind="mesh")
+BUNNY, ENGINE = ("bunny", (1920, 1080), "ga104"), ("2CylinderEngine", (800, 800), "gt750m")
+FRAMES = {  # aims: 0.5 s, that of quads, 0.7 s, 0.7 s
+    "bunny through nine stages": (binned, BinnedOptions(), *BUNNY),
+    "bunny without quads": (binned, BinnedOptions(derivatives="planes"), *BUNNY),
+    "engine by tiles": (tiled, TiledOptions(), *ENGINE),
+    "engine by primitives": (per_primitive, PerPrimitiveOptions(), *ENGINE),
+}
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_textured_frame(benchmark, shared, name):
+    pipeline, options, model, size, machine = FRAMES[name]
+    scene = load_scene(model, kind="mesh")
     view = scene, scene.views["default"].matrix(*size), *size
     simt = load_machine(machine).simt
-    return benchmark.pedantic(lambda: pipeline(*view, simt, options, Executor()), rounds=5, warmup_rounds=1)
-
-
-def test_bunny_through_nine_stages(benchmark, shared):
-    """Aim: 0.5 s."""
-    frame = timed(benchmark, binned, BinnedOptions(), "bunny", (1920, 1080), "ga104")
-    assert (frame.triangle_ids >= 0).any()
-
-
-def test_bunny_without_quads(benchmark, shared):
-    """Aim: that of quads."""
-    frame = timed(benchmark, binned, BinnedOptions(derivatives="planes"), "bunny", (1920, 1080), "ga104")
-    assert (frame.triangle_ids >= 0).any()
-
-
-def test_engine_by_tiles(benchmark, shared):
-    """Aim: 0.7 s."""
-    frame = timed(benchmark, tiled, TiledOptions(), "2CylinderEngine", (800, 800), "gt750m")
-    assert (frame.triangle_ids >= 0).any()
-
-
-def test_engine_by_primitives(benchmark, shared):
-    """Aim: 0.7 s."""
-    frame = timed(benchmark, per_primitive, PerPrimitiveOptions(), "2CylinderEngine", (800, 800), "gt750m")
+    frame = benchmark.pedantic(lambda: pipeline(*view, simt, options, Executor()), rounds=5, warmup_rounds=1)
     assert (frame.triangle_ids >= 0).any()

@@ -62,14 +62,18 @@ def load_entries(first: int, count: int, listed: Any, out: Projected, colours: A
     """Gather the entries of a tile."""
     for k in range(count):
         i = listed[first + k]
-        entry = room.entries[k]
-        entry[GX], entry[GX + 1] = out.positions[i, 0], out.positions[i, 1]
-        for j in range(4):
-            entry[A + j] = out.conics[i, j]
-        for j in range(COLOURS):
-            entry[ENTRY_RED + j] = colours[i, j]
-        entry[LEAST_ENTRY_POWER] = reaches[i, LEAST_POWER]
-        reach_box(out.positions[i, 0], out.positions[i, 1], reaches[i], room.boxes[k])
+        load_entry(i, out, colours, reaches[i], room.entries[k], room.boxes[k])
+
+
+@kernel(lent=True)
+def load_entry(i: int, out: Projected, colours: Any, reach: Any, entry: Any, box: Any) -> None:
+    """Gather one Gaussian, which may be seen as far as ``reach`` says."""
+    entry[GX], entry[GX + 1], entry[LEAST_ENTRY_POWER] = out.positions[i, 0], out.positions[i, 1], reach[LEAST_POWER]
+    for j in range(4):
+        entry[A + j] = out.conics[i, j]
+    for j in range(COLOURS):
+        entry[ENTRY_RED + j] = colours[i, j]
+    reach_box(out.positions[i, 0], out.positions[i, 1], reach, box)
 
 
 @kernel(lent=True)

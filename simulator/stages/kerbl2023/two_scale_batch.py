@@ -7,20 +7,11 @@ from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.kerbl2023 import blend_walk as group
+from tilestamp.simulator.stages.kerbl2023.blend import load_entry
 from tilestamp.simulator.stages.kerbl2023.blend_block import CONIC_BYTES, INDEX_BYTES, POSITION_BYTES, Room
 from tilestamp.simulator.stages.kerbl2023.blend_pixels import COLOURS, place
-from tilestamp.simulator.stages.kerbl2023.blend_step import (
-    ENTRY,
-    ENTRY_RED,
-    GX,
-    LANES,
-    LAST,
-    LEAST_ENTRY_POWER,
-    RED,
-    TRANSMITTANCE,
-    A,
-)
-from tilestamp.simulator.stages.kerbl2023.blend_walk import BOX, LEAST_POWER, reach_box, visible_reach, walk
+from tilestamp.simulator.stages.kerbl2023.blend_step import ENTRY, LANES, LAST, RED, TRANSMITTANCE
+from tilestamp.simulator.stages.kerbl2023.blend_walk import BOX, visible_reach, walk
 from tilestamp.simulator.stages.kerbl2023.project import Projected
 from tilestamp.simulator.stages.kerbl2023.tile_rules import SQUARE, cut_off, tile_columns, tile_rows
 from tilestamp.simulator.stages.kerbl2023.tiles import Tiles
@@ -50,18 +41,9 @@ class Scratch(NamedTuple):
 def load(first: int, count: int, listed: Any, out: Projected, colours: Any, reach: Any, room: Room) -> None:
     """Gather the entries of a batch."""
     for k in range(count):
-        i, entry = listed[first + k], room.entries[k]
+        i = listed[first + k]
         visible_reach(out.conics[i], reach)
-        entry[GX], entry[GX + 1], entry[LEAST_ENTRY_POWER] = (
-            out.positions[i, 0],
-            out.positions[i, 1],
-            reach[LEAST_POWER],
-        )
-        for j in range(4):
-            entry[A + j] = out.conics[i, j]
-        for j in range(COLOURS):
-            entry[ENTRY_RED + j] = colours[i, j]
-        reach_box(out.positions[i, 0], out.positions[i, 1], reach, room.boxes[k])
+        load_entry(i, out, colours, reach, room.entries[k], room.boxes[k])
 
 
 @kernel(lent=True)
