@@ -46,7 +46,7 @@ def test_a_whole_number_steps_and_has_no_elasticity(run, found, key, step):
     after = by_hand(run, key, value + (step or round(value / 10)))
     for stage, row in rows_of(found, key).iterrows():
         assert np.isnan(row["elasticity"])
-        assert row["more"] == pytest.approx(after[stage] / rows_now(found)[stage])
+        assert row["more"] == pytest.approx(after[stage] / found.free["now"][stage])
 
 
 @pytest.mark.parametrize("key", ["sm.register_unit", "memory.dram_fetch_bytes"])
@@ -55,10 +55,6 @@ def test_what_hardware_has_in_powers_of_two_is_halved_and_doubled(run, found, ke
         pytest.skip(f"{run.machine.name} has no L2")
     row, value = rows_of(found, key).loc[FRAME], run.machine.number(key)
     assert [row["lower"], row["higher"]] == [value // 2, value * 2]
-
-
-def rows_now(found):
-    return found.free["now"].to_dict()
 
 
 def test_costs_and_rates_add_up_to_one(found):

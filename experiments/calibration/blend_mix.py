@@ -31,14 +31,10 @@ def loops(blocks: list[Block]) -> list[list[Block]]:
     for i, block in enumerate(blocks):
         to = target(block[-1]) if block and block[-1].opcode == "BRA" else None
         inside = [b for b in blocks[: i + 1] if to is not None and b and to <= b[0].address]
-        if len(inside) > 0 and not _is_detour(inside) and inside[0][0].address != inside[-1][-1].address:
+        detour = any(b[-1].opcode == "EXIT" for b in inside)  # beyond the kernel's end: a branch leads there and back
+        if len(inside) > 0 and not detour and inside[0][0].address != inside[-1][-1].address:
             found.append(inside)
     return sorted(found, key=len, reverse=True)
-
-
-def _is_detour(blocks: list[Block]) -> bool:
-    """Whether it starts at or after the kernel's end: code that a branch leads to and comes back from."""
-    return any(b[-1].opcode == "EXIT" for b in blocks)
 
 
 def program_prices(blocks: list[Block]) -> dict[str, Price]:

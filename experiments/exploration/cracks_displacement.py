@@ -131,13 +131,8 @@ def _notes(cracks: pd.DataFrame, bumps: pd.DataFrame) -> list[str]:
     return [
         f"Time and FLIP, with cracks and with each cure: {'; '.join(said)}.",
         f"With room for displacement {holds}; on {MACHINES[1]} {cost}. Too high for their bound: {refused}.",
-        f"{SURE} It is safe, and grids might have been {_slack(h200):.1f} times as wide at most.",
+        f"{SURE} It is safe, and grids might have been {(h200.bound / h200.widest).max():.1f} times as wide at most.",
     ]
-
-
-def _slack(bumps: pd.DataFrame) -> float:
-    """How much wider grids might have been."""
-    return float((bumps.bound / bumps.widest).max())
 
 
 def _front(cracks: pd.DataFrame, path: Path) -> None:

@@ -25,7 +25,6 @@ from tilestamp.experiments.laine2011.sweep import (
     published_ns,
 )
 from tilestamp.reports.fitted_lines import fitted_lines
-from tilestamp.simulator.run import Run
 
 QUESTION = "How long does each stage take as triangles grow?"
 WORST_AIM, MEDIAN_AIM = 0.25, 0.08
@@ -45,7 +44,8 @@ def run(progress: Progress) -> Result:
             cells.append(
                 Cell(f"{area:g} px", stage, "ns/triangle", published=asked, ours=ns, aim=WORST_AIM, frame=frame)
             )
-            rows.append({"area": area, "stage": stage, "ns": ns, "published": asked, "bound": _bound(made, stage)})
+            bound = str(made.stages.loc[stage, "bound"])
+            rows.append({"area": area, "stage": stage, "ns": ns, "published": asked, "bound": bound})
         cells += counter_cells(area, made.frame.facts["counters"], triangles)
     table = pd.DataFrame(rows)
     return Result(
@@ -67,10 +67,6 @@ def _answer(rows: list[dict[str, Any]]) -> str:
         ours, theirs = (sum(row[name] for row in rows if row["area"] == area) for name in ("ns", "published"))
         said.append(f"{ours:.2f} ns ({theirs:.2f} published) for a triangle of {area:g} pixels")
     return f"The four stages take {' and '.join(said)}."
-
-
-def _bound(made: Run, stage: str) -> str:
-    return str(made.stages.loc[stage, "bound"])
 
 
 def counter_cells(area: float, counters: dict[str, float], triangles: int) -> list[Cell]:

@@ -100,11 +100,8 @@ def front(study: Study, one: str, other: str, jobs: int | None = 1, say: Say = s
     pairs = numbers(table, [one, other])
     table = table.assign(front=pareto_front(pairs[:, 0], pairs[:, 1]))
     shown = table[table.front].drop(columns="front").sort_values([one, other], ignore_index=True)
-    return Answer(shown, [_front(shown, len(table))], partial(_draw_front, table, list(study.axes), one, other))
-
-
-def _front(shown: "pd.DataFrame", cells: int) -> str:
-    return f"Nothing else of {cells} cells beats these {len(shown)} in both"
+    said = f"Nothing else of {len(table)} cells beats these {len(shown)} in both"
+    return Answer(shown, [said], partial(_draw_front, table, list(study.axes), one, other))
 
 
 def _draw_front(table: "pd.DataFrame", axes: list[str], one: str, other: str, into: "Into") -> "Axes":

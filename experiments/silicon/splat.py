@@ -59,7 +59,7 @@ def run(progress: Callable[[str], None]) -> Result:
                 known="measured",
             ),
         )
-        for name, rows in _frames(table)
+        for name, rows in table[table.quantity == FRAME_TIME].groupby("scene", sort=False)
     ]
     notes = [right, *sentences(table)]
     tables = {"all": table, "kernels": by_kernel(table), "fastest-tile": tiles}
@@ -144,7 +144,3 @@ def _cell(row: dict[str, Any]) -> Cell:
     return Cell(
         frame, column, unit, published=row["measured"], ours=row["ours"], aim=row["aim"], frame=frame, status=status
     )
-
-
-def _frames(table: pd.DataFrame) -> Iterator[tuple[Any, pd.DataFrame]]:
-    yield from table[table.quantity == FRAME_TIME].groupby("scene", sort=False)

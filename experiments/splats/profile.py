@@ -15,7 +15,6 @@ from tilestamp.experiments.harness.result import Cell, Result
 from tilestamp.experiments.splats.executed import executed
 from tilestamp.experiments.splats.host import frame_ms
 from tilestamp.models.errors import TilestampError
-from tilestamp.simulator.run import Run
 from tilestamp.simulator.scenes.library import load_scene
 
 QUESTION = "How many frames a second does gsplat's garden take on a TITAN RTX and on an MI300X?"
@@ -40,7 +39,8 @@ def run(progress: Progress) -> Result:
         frame = executed(scene, machine, width=WIDTH, height=HEIGHT, picture=False)
         milliseconds = frame_ms(frame)
         stages = ", ".join(f"{name} {ms:.2f}" for name, ms in frame.stages.milliseconds.items())
-        notes.append(f"garden{grid} on {machine}: {milliseconds:.2f} ms: {stages}; the host {_host(frame):.2f}.")
+        host = frame_ms(frame) - frame.milliseconds
+        notes.append(f"garden{grid} on {machine}: {milliseconds:.2f} ms: {stages}; the host {host:.2f}.")
         for row in rows.to_dict("records"):
             label = f"grid {grid}, {row['backend']}" + (f", {row['images']} images" if row["images"] > 1 else "")
             ours = 1e3 / (row["images"] * milliseconds)
@@ -49,8 +49,3 @@ def run(progress: Progress) -> Result:
 
 
 TITLE = "gsplat's profile: frames a second at 1920x1080"
-
-
-def _host(frame: Run) -> float:
-    """Milliseconds of the host."""
-    return frame_ms(frame) - frame.milliseconds

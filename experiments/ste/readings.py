@@ -44,7 +44,7 @@ def gains(model: Model, level: int, height: int) -> dict[str, float]:
     width = height * 4 // 3
     polygons, quads = (model.on_screen(level, width, height, triangles=split) for split in (True, False))
     without, with_mask = _plain(polygons, width, height), _masked(polygons, width, height)
-    whole = _masked(_as_one(polygons), width, height)
+    whole = _masked(polygons._replace(patch=np.zeros_like(polygons.patch)), width, height)
     front = _of(polygons, _faces_eye(polygons))
     front_with, front_without = _masked(front, width, height), _plain(front, width, height)
     quads_with, quads_without = _masked(quads, width, height), _plain(quads, width, height)
@@ -114,10 +114,6 @@ def _masked(polygons: Micropolygons, width: int, height: int) -> SampleCount:
 
 def _of(polygons: Micropolygons, chosen: NDArray[Any]) -> Micropolygons:
     return Micropolygons(polygons.vertices[chosen], polygons.patch[chosen], polygons.shade[chosen])
-
-
-def _as_one(polygons: Micropolygons) -> Micropolygons:
-    return polygons._replace(patch=np.zeros_like(polygons.patch))
 
 
 def _nearest_first(polygons: Micropolygons) -> Micropolygons:

@@ -135,7 +135,7 @@ def _statements(found: Scan, notes: Notes) -> tuple[NDArray[np.int64], dict[str,
         word, _, rest = found.text(row).replace("\t", " ").partition(" ")
         if word == "usemtl":
             starts.append(row)
-            current.append(names.setdefault(_plain(rest), len(names)))
+            current.append(names.setdefault(" ".join(rest.split()), len(names)))
         elif word == "mtllib":
             libraries.append(rest)
         elif word not in SILENT:
@@ -145,7 +145,3 @@ def _statements(found: Scan, notes: Notes) -> tuple[NDArray[np.int64], dict[str,
     notes.add_if(words, f"statements that are not read: {words}")
     notes.add_if("crease" in words or "t" in skipped, "crease tags (t crease) are ignored: edges are smooth")
     return np.array(current)[np.searchsorted(starts, found.rows(Row.F), side="right") - 1], names, libraries
-
-
-def _plain(name: str) -> str:
-    return " ".join(name.split())
