@@ -24,6 +24,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     count_hit_warp,
     draw_in_parts,
+    hit_columns,
     hit_sample,
     pixel_box,
     units_of,
@@ -56,6 +57,9 @@ class AcrossPolygonsEvent(IntEnum):
     ATOMIC_DEPTH = 10
     LOAD_TRANSACTIONS = 11
     LOAD_BYTES = 12
+
+
+HITS = hit_columns(AcrossPolygonsEvent)
 
 
 def across_polygons(polygons: Micropolygons, samples: Samples, packing: Packing, simt: Simt) -> StageResult[Samples]:
@@ -187,5 +191,4 @@ def _step(samples: Samples, lanes: Any, simt: Simt, row: Any, addresses: Any) ->
     if active:
         row[AcrossPolygonsEvent.TEST_WARPS] += 1
         row[AcrossPolygonsEvent.SAMPLE_TESTS] += active
-    event = AcrossPolygonsEvent
-    count_hit_warp(samples, addresses, hits, simt, row, event.SAMPLE_HITS, event.ATOMIC_LANES)
+    count_hit_warp(samples, addresses, hits, simt, row, HITS)

@@ -5,6 +5,7 @@ picture does not depend on the order of arrival.
 """
 
 from collections.abc import Callable
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,6 +64,22 @@ def new_samples(width: int, height: int, offsets: NDArray[np.int64]) -> Samples:
         np.zeros((height, width), np.int32),
         np.zeros(-(-count * WORD_BYTES // 32), np.int64),
     )
+
+
+class HitColumns(NamedTuple):
+    """Columns of a work table that count the hits of a warp and their atomics, by the names of its events."""
+
+    sample_hits: int
+    hit_warps: int
+    atomic_lanes: int
+    atomic_requests: int
+    atomic_conflicts: int
+    atomic_depth: int
+
+
+def hit_columns(events: type[IntEnum]) -> HitColumns:
+    """Columns of a table of these events."""
+    return HitColumns(*(int(events[name.upper()]) for name in HitColumns._fields))
 
 
 def draw_in_parts(draw: Callable[..., Any], units: int, samples: Samples, *args: Any) -> None:
@@ -133,19 +150,16 @@ def hit_sample(
 
 
 @kernel(lent=True)
-def count_hit_warp(
-    samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any, sample_hits: int, atomic_lanes: int
-) -> None:
-    """Count one warp execution of depth and atomic, if it has hits.
-
-    Columns of the row: from ``sample_hits`` on hits and executions, from ``atomic_lanes`` on what ``count_hits`` gives.
-    """
+def count_hit_warp(samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any, columns: HitColumns) -> None:
+    """Count one warp execution of depth and atomic, if it has hits."""
     if hits:
-        row[sample_hits] += hits
-        row[sample_hits + 1] += 1
-        counts = count_hits(samples, addresses, hits, simt.atomic_merge)
-        for k in range(4):
-            row[atomic_lanes + k] += counts[k]
+        lanes, requests, conflicts, depth = count_hits(samples, addresses, hits, simt.atomic_merge)
+        row[columns.sample_hits] += hits
+        row[columns.hit_warps] += 1
+        row[columns.atomic_lanes] += lanes
+        row[columns.atomic_requests] += requests
+        row[columns.atomic_conflicts] += conflicts
+        row[columns.atomic_depth] += depth
 
 
 @kernel(lent=True)

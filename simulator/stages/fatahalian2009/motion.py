@@ -20,7 +20,12 @@ from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.fatahalian2009.micropolygon_cover import set_up
-from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Samples, count_hit_warp, new_samples
+from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
+    Samples,
+    count_hit_warp,
+    hit_columns,
+    new_samples,
+)
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import SUBPIXELS
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import sample_streams, warp_queue
@@ -50,6 +55,9 @@ class MotionEvent(IntEnum):
     ATOMIC_DEPTH = 11
     LOAD_TRANSACTIONS = 12
     LOAD_BYTES = 13
+
+
+HITS = hit_columns(MotionEvent)
 
 
 class MovingMicropolygons(NamedTuple):
@@ -193,7 +201,7 @@ def begin_warp(first: int, last: int, corners: int, simt: Simt, row: Any) -> Non
 @kernel(lent=True)
 def count_atomic(samples: Samples, addresses: Any, hits: int, simt: Simt, row: Any) -> None:
     """Count the atomics of the hits of one warp execution of the sample test."""
-    count_hit_warp(samples, addresses, hits, simt, row, MotionEvent.SAMPLE_HITS, MotionEvent.ATOMIC_LANES)
+    count_hit_warp(samples, addresses, hits, simt, row, HITS)
 
 
 @kernel(lent=True)

@@ -29,6 +29,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import (
     Samples,
     count_hit_warp,
     draw_in_parts,
+    hit_columns,
     keep_nearest,
     pixel_box,
     units_of,
@@ -70,6 +71,9 @@ class BitMaskEvent(IntEnum):
     ATOMIC_DEPTH = 19
     LOAD_TRANSACTIONS = 20
     LOAD_BYTES = 21
+
+
+HITS = hit_columns(BitMaskEvent)
 
 
 def bit_mask(polygons: Micropolygons, samples: Samples, kind: MaskKind, lanes: int, simt: Simt) -> StageResult[Samples]:
@@ -204,7 +208,7 @@ def _step(
     if active:
         row[BitMaskEvent.TEST_WARPS] += 1
         row[BitMaskEvent.SAMPLE_TESTS] += active
-    count_hit_warp(samples, addresses, hits, simt, row, BitMaskEvent.SAMPLE_HITS, BitMaskEvent.ATOMIC_LANES)
+    count_hit_warp(samples, addresses, hits, simt, row, HITS)
     if hits:
         _write_mask(mask, words, bits, hits, shared, row)
     return active > 0
