@@ -80,8 +80,8 @@ def tiled(
         **model.facts,
     }  # fmt: skip
     return Frame(
-        image, visible.depth, execute.works, input_ids(model.mesh, visible.triangles), _maps(sizes, raster, -(-height // tile)),
-        facts, remarks(REMARKS, facts), tile,
+        image, visible.depth, execute.works, input_ids(model.mesh, visible.triangles),
+        _maps(sizes, raster, -(-height // tile)), facts, remarks(REMARKS, facts), tile,
     )  # fmt: skip
 
 

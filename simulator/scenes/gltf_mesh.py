@@ -206,7 +206,7 @@ def _normals(
 @lru_cache(256)
 def _inverse(matrix: bytes) -> NDArray[np.float64]:
     """Pseudo-inverse of a matrix, (3, 3) float64: parts of a model mostly share a few."""
-    return np.linalg.pinv(np.frombuffer(matrix).reshape(3, 3))
+    return np.asarray(np.linalg.pinv(np.frombuffer(matrix).reshape(3, 3)), np.float64)
 
 
 def _join(parts: list[dict[str, Any]], textures: tuple[NDArray[np.uint8], ...]) -> Mesh:

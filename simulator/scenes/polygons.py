@@ -178,7 +178,8 @@ def vertex_normals(positions: NDArray[Any], triangles: NDArray[Any]) -> NDArray[
 def lengths(vectors: Floats) -> Floats:
     """Lengths (n, 1) of some vectors (n, 3), as ``np.linalg.norm`` has them, column by column."""
     x, y, z = (vectors * vectors).T
-    return np.sqrt(x + y + z)[:, None]
+    found: Floats = np.sqrt(x + y + z)
+    return found[:, None]
 
 
 @kernel
