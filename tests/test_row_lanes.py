@@ -5,7 +5,7 @@ import pytest
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.ru2016.row_lanes import eight_inside, write_nearer
-from tilestamp.simulator.stages.ru2016.tiled_raster import _mark
+from tilestamp.simulator.stages.ru2016.tiled_raster import mark_warps
 
 TRIANGLES = {  # x and y of three corners
     "large": (-5, -5, 30, 2, 3, 40),
@@ -67,6 +67,6 @@ def test_pixels_without_a_bit_are_not_touched_at_the_end_of_an_array():
 @pytest.mark.parametrize(("lane", "warp", "hit"), [(0, 32, [0]), (28, 32, [0, 1]), (8, 4, [2, 3]), (5, 3, [1, 3, 4])])
 def test_a_row_marks_the_warps_that_its_lanes_belong_to(lane, warp, hit):
     marks = np.zeros((4, 6), np.int64)
-    _mark(np.uint64(0b10010001), np.uint64(1), lane, warp, marks)
+    mark_warps(np.uint64(0b10010001), np.uint64(1), lane, warp, marks)
     assert np.flatnonzero(marks[0]).tolist() == hit
     assert np.flatnonzero(marks[1]).tolist() == hit[:1]

@@ -80,7 +80,7 @@ class Visible(NamedTuple):
 
 
 @kernel(error_model="numpy", lent=True)
-def _mark(hits: Any, nearer: Any, lane: int, warp: int, marks: Any) -> None:
+def mark_warps(hits: Any, nearer: Any, lane: int, warp: int, marks: Any) -> None:
     """Mark the warps of eight pixels of a row, the first of which is ``lane`` of its tile."""
     w, lanes = lane // warp, min(warp - lane % warp, LANES)
     while hits != np.uint64(0):
@@ -115,7 +115,7 @@ def _tile(
                 nearer = write_nearer(triangle, x_first + x, y_first + y, py, hits, t, depth, visible)
                 row[TiledRasterEvent.SAMPLE_HITS] += popcount(hits)
                 row[TiledRasterEvent.NEARER_LANES] += popcount(nearer)
-                _mark(hits, nearer, y * tile + x, warp, marks)
+                mark_warps(hits, nearer, y * tile + x, warp, marks)
         for w in range(marks.shape[1]):
             row[TiledRasterEvent.HIT_WARPS] += marks[0, w]
             row[TiledRasterEvent.NEARER_WARPS] += marks[1, w]
