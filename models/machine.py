@@ -140,18 +140,28 @@ def load_machine(name_or_path: str | Path | Machine) -> Machine:
             raise TilestampError(f"no machine {word!r}{did_you_mean(word.lower(), known)}; known: {', '.join(known)}")
     if not is_file(path):
         raise TilestampError(f"there is no machine file {path}")
+    machine = _shipped(path, path.stat().st_mtime_ns) if path.parent == FOLDER else _read(path)
+    shipped = FOLDER / f"{machine.name}.toml"
+    if is_file(shipped) and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
+        machine = msgspec.structs.replace(machine, file=f"{path.name}, digest {machine.digest}")
+    note_machine(machine)
+    return machine
+
+
+@lru_cache(64)
+def _shipped(path: Path, _modified: int) -> Machine:
+    return _read(path)
+
+
+def _read(path: Path) -> Machine:
+    """Read a machine file."""
     try:
         table = tomllib.loads(path.read_text("utf-8-sig"))
     except OSError as error:
         raise TilestampError(f"cannot read the machine file {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # no TOML or no text
         raise TilestampError(f"{path} is not a TOML file: {error}") from error
-    machine = _build(table, str(path))
-    shipped = FOLDER / f"{machine.name}.toml"
-    if is_file(shipped) and not shipped.samefile(path) and load_machine(machine.name).digest != machine.digest:
-        machine = msgspec.structs.replace(machine, file=f"{path.name}, digest {machine.digest}")
-    note_machine(machine)
-    return machine
+    return _build(table, str(path))
 
 
 def altered(

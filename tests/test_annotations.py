@@ -28,6 +28,7 @@ FOREIGN = {  # what they take belongs to a library without types
     "simulator/stages/kerbl2023/blend_step.py": "numba",
     "simulator/stages/laine2011/exact.py": "numba",
     "simulator/stages/laine2011/lanes.py": "numba",
+    "simulator/stages/ru2016/row_lanes.py": "numba",
     "simulator/stages/laine2011/tile_pixels.py": "numba",
     "simulator/stages/zhang2025/stepped_tile.py": "numba",
     "experiments/harness/cluster.py": "joblib",

@@ -78,8 +78,3 @@ def shade_fragments(
         fragment_shading, model.mesh, chains, visible, fragments, light, simt, texture_filter=options.texture_filter
     ).outputs
     return image
-
-
-def input_ids(model: Model, visible: Visible) -> NDArray[np.int32]:
-    """Input index of the visible triangle, -1 where there is none."""
-    return np.where(visible.triangles >= 0, model.mesh.ids[visible.triangles], -1).astype(np.int32)

@@ -29,7 +29,7 @@ from tilestamp.simulator.options import Options
 from tilestamp.simulator.scenes.clip_space import model_to_clip
 from tilestamp.simulator.scenes.scene import Scene
 from tilestamp.simulator.scenes.texture import MAX_LEVELS, TILE, texture_chains
-from tilestamp.simulator.scenes.textured_mesh import geometry
+from tilestamp.simulator.scenes.textured_mesh import geometry, input_ids
 from tilestamp.simulator.stages.zhang2025.coarse_bin import TILE as SCREEN_TILE
 from tilestamp.simulator.stages.zhang2025.coarse_bin import CoarseRasterizerEvent
 from tilestamp.simulator.stages.zhang2025.coarse_rasterizer import coarse_rasterizer, coarse_work
@@ -162,7 +162,7 @@ def binned(
         image,
         pixels.depth[::-1],
         execute.works,
-        triangle_ids=np.append(mesh.ids, np.int32(-1))[pixels.winners][::-1],  # the last one where there is none
+        triangle_ids=input_ids(mesh, pixels.winners)[::-1],
         maps={"tile queue": np.diff(tiles.starts).reshape(-1, tiles.columns)[::-1]},
         facts=facts,
         warnings=remarks(REMARKS, facts),

@@ -22,8 +22,9 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.pipelines._ru import REMARKS as RU_REMARKS
-from tilestamp.simulator.pipelines._ru import RuOptions, input_ids, shade_fragments, shade_vertices
+from tilestamp.simulator.pipelines._ru import RuOptions, shade_fragments, shade_vertices
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.textured_mesh import input_ids
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.per_primitive_raster import per_primitive_raster
 from tilestamp.simulator.stages.ru2016.tiled_raster import Visible
@@ -59,5 +60,5 @@ def per_primitive(
     wrong = (raced.triangles != meant.triangles).astype(np.int64)
     facts = {RACED: int(wrong.sum()), "pixels drawn": int((meant.triangles >= 0).sum()), **model.facts}
     said = remarks(RU_REMARKS, facts) + (remarks(REMARKS, facts) if options.race else ())
-    ids = input_ids(model, visible)
+    ids = input_ids(model.mesh, visible.triangles)
     return Frame(image, meant.depth, execute.works, ids, {"race": wrong, RACED: wrong}, facts, said)

@@ -24,8 +24,9 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.executor import Executor
 from tilestamp.simulator.frame import Frame, remarks
 from tilestamp.simulator.pipelines._ru import REMARKS as RU_REMARKS
-from tilestamp.simulator.pipelines._ru import RuOptions, input_ids, shade_fragments, shade_vertices
+from tilestamp.simulator.pipelines._ru import RuOptions, shade_fragments, shade_vertices
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.scenes.textured_mesh import input_ids
 from tilestamp.simulator.stages.ru2016.clear import clear
 from tilestamp.simulator.stages.ru2016.tile_lists import Capacity, tile_lists
 from tilestamp.simulator.stages.ru2016.tiled_raster import TiledRasterEvent, raster_work, tiled_raster
@@ -79,8 +80,8 @@ def tiled(
         **model.facts,
     }  # fmt: skip
     return Frame(
-        image, visible.depth, execute.works, input_ids(model, visible), _maps(sizes, raster, -(-height // tile)),
-        facts, remarks(REMARKS, facts), tile,
+        image, visible.depth, execute.works, input_ids(model.mesh, visible.triangles),
+        _maps(sizes, raster, -(-height // tile)), facts, remarks(REMARKS, facts), tile,
     )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ class GltfFile:
         """Give (count, width) values of a buffer view."""
         view = self._entry("bufferViews", place["bufferView"])
         start, offset = view.get("byteOffset", 0), place.get("byteOffset", 0)
-        whole = self._buffer(view["buffer"])
+        whole = memoryview(self._buffer(view["buffer"]))  # of which a part is no copy
         data = whole[: start + view.get("byteLength", len(whole))]
         strides = (view.get("byteStride") or kind.itemsize * width, kind.itemsize)
         return np.ndarray((count, width), kind, data, start + offset, strides).copy()

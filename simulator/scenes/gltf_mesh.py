@@ -1,5 +1,6 @@
 """Meshes of glTF files: lists, strips and fans of triangles, placed by their nodes and joined, with their textures."""
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from tilestamp.simulator.scenes.clip_space import checked_mesh
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.gltf_file import READ, GltfFile
 from tilestamp.simulator.scenes.notes import Notes
-from tilestamp.simulator.scenes.polygons import vertex_normals
+from tilestamp.simulator.scenes.polygons import lengths, vertex_normals
 from tilestamp.simulator.scenes.strips import fan_triangles, strip_triangles
 
 POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, STRIP, FAN = range(7)
@@ -195,11 +196,17 @@ def _normals(
     """Give the normals of a part in the scene's space."""
     if "NORMAL" not in attributes:
         return vertex_normals(positions, triangles)
-    normals = file.accessor(attributes["NORMAL"], "VEC3").astype(np.float64) @ np.linalg.pinv(matrix[:3, :3])
+    normals = file.accessor(attributes["NORMAL"], "VEC3").astype(np.float64) @ _inverse(matrix[:3, :3].tobytes())
     if len(normals) != len(positions):
         raise TilestampError(f"{file.path.name}: broken glTF: {len(normals)} normals for {len(positions)} vertices")
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return (normals / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
+    far = lengths(normals)
+    return (normals / np.where(far > 0.0, far, 1.0)).astype(np.float32)
+
+
+@lru_cache(256)
+def _inverse(matrix: bytes) -> NDArray[np.float64]:
+    """Pseudo-inverse of a matrix, (3, 3) float64: parts of a model mostly share a few."""
+    return np.asarray(np.linalg.pinv(np.frombuffer(matrix).reshape(3, 3)), np.float64)
 
 
 def _join(parts: list[dict[str, Any]], textures: tuple[NDArray[np.uint8], ...]) -> Mesh:

@@ -162,8 +162,7 @@ def model_mesh(
     if normals is None or not np.isfinite(normals).all():
         made = vertex_normals(positions, indices)
     else:
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        made = (normals / np.maximum(lengths, np.finfo(np.float64).tiny)).astype(np.float32)
+        made = (normals / np.maximum(lengths(normals), np.finfo(np.float64).tiny)).astype(np.float32)
     return Mesh(points, indices, None if colors is None else colors.astype(np.float32), made)
 
 
@@ -171,9 +170,16 @@ def vertex_normals(positions: NDArray[Any], triangles: NDArray[Any]) -> NDArray[
     """Average unit normals at the vertices, weighted by the areas of the triangles around; zero where none is."""
     sums = np.zeros((len(positions), 3))
     _add_normals(positions, triangles, sums)
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    normals: NDArray[np.float32] = np.divide(sums, lengths, out=sums, where=lengths > 0).astype(np.float32)
+    far = lengths(sums)
+    normals: NDArray[np.float32] = np.divide(sums, far, out=sums, where=far > 0).astype(np.float32)
     return normals
+
+
+def lengths(vectors: Floats) -> Floats:
+    """Lengths (n, 1) of some vectors (n, 3), as ``np.linalg.norm`` has them, column by column."""
+    x, y, z = (vectors * vectors).T
+    found: Floats = np.sqrt(x + y + z)
+    return found[:, None]
 
 
 @kernel

@@ -70,6 +70,13 @@ def geometry(scene: Scene) -> Geometry:
     return Geometry(positions, triangles, _clean(colors), _clean(normals), _clean(uvs), textures, ids)
 
 
+def input_ids(mesh: Geometry, drawn: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Input index of the triangle that each pixel shows, -1 where it shows none."""
+    ids, shown = np.full(drawn.shape, -1, np.int32), drawn >= 0
+    ids[shown] = mesh.ids[drawn[shown]]
+    return ids
+
+
 def with_texture(scene: Scene, image: NDArray[np.uint8]) -> Scene:
     """Lay one image, (H, W, 4) uint8, over all triangles of a mesh, by its coordinates.
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tilestamp.models.bits import lowest_bit, popcount
+from tilestamp.models.bits import popcount
 from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
 from tilestamp.models.counters import shown
 from tilestamp.models.kernel import kernel
@@ -23,9 +23,11 @@ from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
+from tilestamp.simulator.stages.laine2011.lanes import LANES
 from tilestamp.simulator.stages.ru2016.compiled import words
+from tilestamp.simulator.stages.ru2016.row_lanes import eight_inside, write_nearer
 from tilestamp.simulator.stages.ru2016.tile_lists import SECTOR_BYTES, TileLists
-from tilestamp.simulator.stages.ru2016.triangle import area, barycentric, corners, inside
+from tilestamp.simulator.stages.ru2016.triangle import area, corners
 from tilestamp.simulator.stages.sample_tests import SAMPLE_COUNTERS
 from tilestamp.simulator.work import Work
 
@@ -36,7 +38,6 @@ LINE_BYTES = 128
 FAR = np.float32(1.0)
 _HALF = np.float32(0.5)
 _ONE = np.float32(1.0)
-_ZERO = np.float32(0.0)
 
 
 @shown(*SAMPLE_COUNTERS)
@@ -79,16 +80,18 @@ class Visible(NamedTuple):
 
 
 @kernel(error_model="numpy", lent=True)
-def _hits(
-    x0: Any, y0: Any, x1: Any, y1: Any, x2: Any, y2: Any, inverse: Any, x_first: int, columns: int, py: Any
-) -> Any:
-    """Pixels of a row that lie in a triangle, the first at the lowest bit of a uint64."""
-    hits = 0
-    for x in range(columns):
-        px = np.float32(x_first + x) + _HALF
-        a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, px, py)
-        hits |= (1 if inside(a, b, c) else 0) << x
-    return np.uint64(hits)
+def mark_warps(hits: Any, nearer: Any, lane: int, warp: int, marks: Any) -> None:
+    """Mark the warps of eight pixels of a row, the first of which is ``lane`` of its tile."""
+    w, lanes = lane // warp, min(warp - lane % warp, LANES)
+    while hits != np.uint64(0):
+        own = ~np.uint64(0) >> np.uint64(64 - lanes)
+        if hits & own:
+            marks[0, w] = 1
+        if nearer & own:
+            marks[1, w] = 1
+        hits >>= np.uint64(lanes)
+        nearer >>= np.uint64(lanes)
+        w, lanes = w + 1, min(warp, LANES)
 
 
 @kernel(error_model="numpy", lent=True)
@@ -98,27 +101,21 @@ def _tile(
 ) -> None:  # fmt: skip
     """Rasterize one tile's list; ``marks``, (4, warps): who hits and who comes nearer now, and how often so far."""
     height, width = depth.shape
-    columns = min(tile, width - x_first)
+    on_screen = ~np.uint64(0) >> np.uint64(64 - min(tile, width - x_first))
     for t in entries:
-        x0, y0, x1, y1, x2, y2 = corners(screen, triangles, t)
-        inverse = _ONE / area(x0, y0, x1, y1, x2, y2)
-        z0, z1, z2 = screen[triangles[t, 0], 2], screen[triangles[t, 1], 2], screen[triangles[t, 2], 2]
+        places = corners(screen, triangles, t)
+        depths = screen[triangles[t, 0], 2], screen[triangles[t, 1], 2], screen[triangles[t, 2], 2]
+        triangle = places, _ONE / area(*places), depths
         for y in range(min(tile, height - y_first)):
             py = np.float32(y_first + y) + _HALF
-            hits = _hits(x0, y0, x1, y1, x2, y2, inverse, x_first, columns, py)
-            row[TiledRasterEvent.SAMPLE_HITS] += popcount(hits)
-            while hits != np.uint64(0):
-                column = lowest_bit(hits)
-                hits &= hits - np.uint64(1)
-                x, w = x_first + column, (y * tile + column) // warp
-                a, b, c = barycentric(x0, y0, x1, y1, x2, y2, inverse, np.float32(x) + _HALF, py)
-                z = a * z0 + b * z1 + c * z2
-                marks[0, w] = 1
-                if z >= _ZERO and z < depth[y_first + y, x]:
-                    depth[y_first + y, x] = z
-                    visible[y_first + y, x] = t
-                    row[TiledRasterEvent.NEARER_LANES] += 1
-                    marks[1, w] = 1
+            for x in range(0, tile, LANES):
+                hits = eight_inside(triangle, x_first + x, py) & (on_screen >> np.uint64(x))
+                if hits == np.uint64(0):
+                    continue
+                nearer = write_nearer(triangle, x_first + x, y_first + y, py, hits, t, depth, visible)
+                row[TiledRasterEvent.SAMPLE_HITS] += popcount(hits)
+                row[TiledRasterEvent.NEARER_LANES] += popcount(nearer)
+                mark_warps(hits, nearer, y * tile + x, warp, marks)
         for w in range(marks.shape[1]):
             row[TiledRasterEvent.HIT_WARPS] += marks[0, w]
             row[TiledRasterEvent.NEARER_WARPS] += marks[1, w]

@@ -179,9 +179,10 @@ def primitive_assembly(
     works : one
     """
     count = len(mesh.triangles)
-    xyz, w = vertices.clip[:, :3], vertices.clip[:, 3:]
-    crossing = np.asarray((np.abs(xyz) > w).any(axis=1))[mesh.triangles].any(axis=1)
-    slots = count + MOST_PIECES * int(crossing.sum())
+    x, y, z, w = vertices.clip.T
+    beyond = (np.abs(x) > w) | (np.abs(y) > w) | (np.abs(z) > w)
+    crossing = np.count_nonzero(np.logical_or.reduce([beyond[mesh.triangles[:, k]] for k in range(3)]))
+    slots = count + MOST_PIECES * int(crossing)
     out = Primitives(
         np.empty((slots, 3, 4), np.float32), np.empty((slots, 3, VARYINGS), np.float32), np.full(slots, -1, np.int32)
     )

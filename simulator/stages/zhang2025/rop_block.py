@@ -84,6 +84,34 @@ def _resolve(keys: Any, count: int, colors: Any, ids: Any, order: int, nearest: 
 
 
 @kernel(error_model="numpy", lent=True)
+def _shown_depth(nearest: Any) -> Any:
+    """A depth in [0, 1] of one of 24 bits, 1 where nothing was drawn."""
+    return np.float32(nearest / np.float64(DEPTH_STEPS)) if nearest <= int(DEPTH_STEPS) else _ONE
+
+
+@kernel(error_model="numpy", lent=True)
+def _resolve_bare_block(heads: Any, left: int, bottom: int, warp: int, depth: Any, shown: Any, row: Any) -> bool:
+    """One whole block without a list, where it is one: a row of pixels at once."""
+    height, width = heads.shape
+    if left + BLOCK_SIDE > width or bottom + BLOCK_SIDE > height or BLOCK_SIDE * BLOCK_SIDE % warp:
+        return False
+    highest = np.int32(-1)
+    for y in range(bottom, bottom + BLOCK_SIDE):
+        pixels = heads[y, left : left + BLOCK_SIDE]
+        for x in range(BLOCK_SIDE):
+            highest = max(highest, pixels[x])
+    if highest >= 0:
+        return False
+    for y in range(bottom, bottom + BLOCK_SIDE):
+        pixels, nearest = shown[y, left : left + BLOCK_SIDE], depth[y, left : left + BLOCK_SIDE]
+        for x in range(BLOCK_SIDE):
+            pixels[x] = _shown_depth(nearest[x])
+    row[RopEvent.WARPS] += BLOCK_SIDE * BLOCK_SIDE // warp
+    row[RopEvent.WARP_LANES] += BLOCK_SIDE * BLOCK_SIDE
+    return True
+
+
+@kernel(error_model="numpy", lent=True)
 def resolve_block(
     heads: Any, links: Any, fragments: Any, primitives: Any, left: int, bottom: int, warp: int, order: int, way: int,
     keys: Any, depth: Any, resolved: Any, row: Any,
@@ -91,8 +119,11 @@ def resolve_block(
     """One block of 16x16 pixels, warp by warp."""
     target, shown, winners = resolved
     height, width = heads.shape
+    if _resolve_bare_block(heads, left, bottom, warp, depth, shown, row):
+        return
     for first in range(0, BLOCK_SIDE * BLOCK_SIDE, warp):
         longest = sorted_steps = blended = live = lists = 0
+        steps = kept = swaps = holes = left_out = 0
         for thread in range(first, first + warp):
             x, y = left + thread % BLOCK_SIDE, bottom + thread // BLOCK_SIDE
             if x >= width or y >= height:
@@ -110,12 +141,12 @@ def resolve_block(
                 blended = max(blended, count)
                 lists += 1
                 sorted_steps = max(sorted_steps, count * (count - 1) // 2)
-                row[RopEvent.LIST_LANES] += walked
-                row[RopEvent.BLEND_LANES] += count
-                row[RopEvent.SORT_LANES] += count * (count - 1) // 2
-                row[RopEvent.HOLES] += count > 0 and winner < 0
-                row[RopEvent.LOST] += lost
-            shown[y, x] = np.float32(nearest / np.float64(DEPTH_STEPS)) if nearest <= int(DEPTH_STEPS) else _ONE
+                steps += walked
+                kept += count
+                swaps += count * (count - 1) // 2
+                holes += count > 0 and winner < 0
+                left_out += lost
+            shown[y, x] = _shown_depth(nearest)
         if live:
             row[RopEvent.WARPS] += 1
             row[RopEvent.WARP_LANES] += live
@@ -124,3 +155,8 @@ def resolve_block(
             row[RopEvent.LIST_STEPS] += longest
             row[RopEvent.SORT_STEPS] += sorted_steps
             row[RopEvent.BLEND_STEPS] += blended
+            row[RopEvent.LIST_LANES] += steps
+            row[RopEvent.BLEND_LANES] += kept
+            row[RopEvent.SORT_LANES] += swaps
+            row[RopEvent.HOLES] += holes
+            row[RopEvent.LOST] += left_out
