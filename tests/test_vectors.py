@@ -76,3 +76,22 @@ def test_ends_pass_over_what_is_no_number(place):
     for start, ends in ((a[place], [np.nan, np.nan]), (np.float32(10), [min(10, np.nanmin(a)), np.nanmax(a)])):
         _ends(a, start, out)
         np.testing.assert_array_equal(out, ends)
+
+
+@kernel
+def _gather(a, places, out):
+    store(out, 0, vectors.gather(a, places, 2, 3))
+    found = np.zeros(2, np.uint64)
+    found[0] = bits((load(a, 0) > TWO) == (load(a, 1) > TWO))
+    return found[0]
+
+
+@pytest.mark.small
+def test_numbers_are_gathered_by_four():
+    a, out, places = (
+        np.arange(200, dtype=np.float32),
+        np.zeros(16, np.float32),
+        (np.arange(20, dtype=np.uint64) * 7) % 31,
+    )
+    assert _gather(a, places, out) == 0xFFFF ^ 0b100
+    np.testing.assert_array_equal(out, 4 * places[2:18].astype(np.float32) + 3)

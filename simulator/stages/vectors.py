@@ -39,6 +39,11 @@ def load_vertices(array: Any, at: Any) -> Any:
     return tuple(array[at + k : at + SIDE * COUNT : SIDE].copy() for k in range(SIDE))
 
 
+def gather(array: Any, places: Any, at: Any, further: int) -> Vector:
+    """Sixteen numbers of a flat array, each four times its one of the uint64 ``places[at:]`` and ``further`` behind."""
+    return array[SIDE * places[at : at + COUNT].astype(np.int64) + further]
+
+
 def store(array: Any, at: Any, vector: Vector) -> None:
     """Write sixteen numbers to a flat array."""
     array[at : at + COUNT] = vector
@@ -225,6 +230,7 @@ for _operator, _code in (
 for _operator, _code in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
     _compile(_operator, _MASK, _NUMBERS, _NUMBERS)(_method("fcmp_ordered", _code))
 _compile(operator.ne, _MASK, _NUMBERS, _NUMBERS)(_method("fcmp_unordered", "!="))
+_compile(operator.eq, _MASK, _MASK, _MASK)(_method("icmp_signed", "=="))
 _compile(operator.and_, _MASK, _MASK, _MASK)(_method("and_"))
 _compile(operator.or_, _MASK, _MASK, _MASK)(_method("or_"))
 _compile(operator.invert, _MASK, _MASK)(_method("not_"))
@@ -289,6 +295,19 @@ def _bits(builder: Any, mask: Any) -> Any:
 @_compile(load, _NUMBERS, types.Array, types.Integer)
 def _load(builder: Any, data: Any, at: Any) -> Any:
     return builder.load(_place(builder, data, at, 0), align=4)
+
+
+@_compile(gather, _NUMBERS, types.Array, types.Array, types.Integer, types.Integer)
+def _gather(builder: Any, data: Any, places: Any, at: Any, further: Any) -> Any:
+    from llvmlite import ir
+
+    long, vector = ir.IntType(64), ir.Constant(_kind(), ir.Undefined)
+    for lane in range(COUNT):
+        place = builder.load(builder.gep(places, [builder.add(at, ir.Constant(long, lane))]))
+        place = builder.add(builder.shl(place, ir.Constant(long, 2)), further)
+        number = builder.load(builder.gep(data, [place]))
+        vector = builder.insert_element(vector, number, ir.Constant(ir.IntType(32), lane))
+    return vector
 
 
 @_compile(store, types.void, types.Array, types.Integer, _NUMBERS)

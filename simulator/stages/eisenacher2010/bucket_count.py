@@ -131,26 +131,14 @@ def patch_traffic(
     return loads, load_bytes, stores, store_bytes
 
 
-@kernel
-def _count_blocks(
-    part: int,
-    parts: int,
-    boxes: Any,
-    tiles: Tiles,
-    rule: AtomicRule,
-    coalescing: Any,
-    aggregate: bool,
-    counts: Any,
-    idx: Any,
-    table: Any,
-    requests: Any,
-) -> None:
-    """COUNT and IDX as the blocks of one part alone make them, and their events; ``counts`` has a row a part."""
+@kernel(lent=True)
+def _count_part(
+    part: int, parts: int, boxes: Any, tiles: Tiles, rule: AtomicRule, coalescing: Any, aggregate: bool, count: Any,
+    idx: Any, table: Any, chunk_requests: Any, slots: Any, corners: Any, addresses: Any, words: Any,
+) -> None:  # fmt: skip
+    """``_count_blocks``, with its own row of counts and requests, and scratch for one warp."""
     patches = boxes.shape[0]
     blocks = (patches + BLOCK - 1) // BLOCK
-    count, chunk_requests = counts[part], requests[part]
-    slots, corners = np.empty((tiles.slots**2, rule.warp), np.int64), np.empty((4, rule.warp), np.int64)
-    addresses, words = np.empty(rule.warp, np.int64), np.empty(rule.warp, np.int64)
     traffic = patch_traffic(0, rule.warp, patches, tiles.slots, coalescing, addresses)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), rule.warp):
@@ -173,11 +161,26 @@ def _count_blocks(
 
 
 @kernel
-def _add_before(part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, before: Any, idx: Any) -> None:
-    """Add to each place what the parts of ``_count_blocks`` before its own have put into the tile, a row a part."""
+def _count_blocks(
+    part: int, parts: int, boxes: Any, tiles: Tiles, rule: AtomicRule, coalescing: Any, aggregate: bool, counts: Any,
+    idx: Any, table: Any, requests: Any,
+) -> None:  # fmt: skip
+    """COUNT and IDX as the blocks of one part alone make them, and their events; ``counts`` has a row a part."""
+    slots, corners = np.empty((tiles.slots**2, rule.warp), np.int64), np.empty((4, rule.warp), np.int64)
+    addresses, words = np.empty(rule.warp, np.int64), np.empty(rule.warp, np.int64)
+    _count_part(
+        part, parts, boxes, tiles, rule, coalescing, aggregate, counts[part], idx, table, requests[part], slots,
+        corners, addresses, words,
+    )  # fmt: skip
+
+
+@kernel(lent=True)
+def _add_part(
+    part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, before: Any, idx: Any, slots: Any, corners: Any
+) -> None:
+    """``_add_before``, with scratch for one warp."""
     patches, owner, owners = boxes.shape[0], 0, before.shape[0]
     blocks = (patches + BLOCK - 1) // BLOCK
-    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
     begin = blocks // owners  # nothing is before the first part
     for block in range(begin + (blocks - begin) * part // parts, begin + (blocks - begin) * (part + 1) // parts):
         while (owner + 1) * blocks // owners <= block:
@@ -190,6 +193,13 @@ def _add_before(part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, befo
                 for lane in range(lanes):
                     if slots[slot, lane] >= 0:
                         mine[lane, slot] += before[owner, slots[slot, lane]]
+
+
+@kernel
+def _add_before(part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, before: Any, idx: Any) -> None:
+    """Add to each place what the parts of ``_count_blocks`` before its own have put into the tile, a row a part."""
+    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
+    _add_part(part, parts, boxes, tiles, warp, before, idx, slots, corners)
 
 
 class Counted(NamedTuple):

@@ -86,24 +86,14 @@ def _count_slot(tile: Any, lanes: int, last: bool, coalescing: Any, counters: An
     row[_E.STORE_LINES] += touched_lines(addresses, lanes)
 
 
-@kernel
-def _write_blocks(
-    part: int,
-    parts: int,
-    boxes: Any,
-    tiles: Tiles,
-    warp: int,
-    start: Any,
-    idx: Any,
-    coalescing: Any,
-    lists: Any,
-    table: Any,
-) -> None:
-    """Fill LISTS from the blocks of one part, and count their events."""
+@kernel(lent=True)
+def _write_part(
+    part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, start: Any, idx: Any, coalescing: Any, lists: Any,
+    table: Any, slots: Any, corners: Any, addresses: Any, counters: Any,
+) -> None:  # fmt: skip
+    """``_write_blocks``, with scratch for one warp."""
     patches = boxes.shape[0]
     blocks = (patches + BLOCK - 1) // BLOCK
-    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
-    addresses, counters = np.empty(warp, np.int64), np.empty(warp, np.int64)
     traffic = patch_traffic(0, warp, patches, tiles.slots, coalescing, addresses)
     for block in range(part * blocks // parts, (part + 1) * blocks // parts):
         for first in range(block * BLOCK, min((block + 1) * BLOCK, patches), warp):
@@ -124,6 +114,19 @@ def _write_blocks(
                 if table is not None:
                     last = slot == tiles.slots**2 - 1
                     _count_slot(slots[slot], lanes, last, coalescing, counters, addresses, table[block])
+
+
+@kernel
+def _write_blocks(
+    part: int, parts: int, boxes: Any, tiles: Tiles, warp: int, start: Any, idx: Any, coalescing: Any, lists: Any,
+    table: Any,
+) -> None:  # fmt: skip
+    """Fill LISTS from the blocks of one part, and count their events."""
+    slots, corners = np.empty((tiles.slots**2, warp), np.int64), np.empty((4, warp), np.int64)
+    addresses, counters = np.empty(warp, np.int64), np.empty(warp, np.int64)
+    _write_part(
+        part, parts, boxes, tiles, warp, start, idx, coalescing, lists, table, slots, corners, addresses, counters
+    )
 
 
 def bucket_write(

@@ -212,7 +212,7 @@ def culled_raster(
     image, depth = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
     overdraw, table = np.empty((height, width), np.int32), np.zeros((tiles.total, len(CulledRasterEvent)), np.int64)
     kept = np.full(len(lists), NONE, np.uint32)
-    nearest, points = vertices[:, :, 2].min(axis=1), vertices.reshape(-1, 4)
+    nearest, points = vertices[:, :, 2].min(axis=1), vertices.reshape(-1)
     for_parts(
         _raster_tiles, parts_of(tiles.total, _PART_TILES), points, points.view(np.uint32), nearest, count, start, lists,
         tiles, shape, block_traffic(shape, simt), by_depth, kept, image, depth, overdraw, table,

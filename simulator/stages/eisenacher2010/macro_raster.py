@@ -216,7 +216,7 @@ def macro_raster(
     large, shape = (shape_for(vertices, tiles, simt, **rules) for tiles in (coarse, fine))
     image, depth = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
     overdraw, table = np.empty((height, width), np.int32), np.zeros((coarse.total, len(MacroRasterEvent)), np.int64)
-    points, traffic = vertices.reshape(-1, 4), block_traffic(large, simt)
+    points, traffic = vertices.reshape(-1), block_traffic(large, simt)
     for_parts(
         _raster_tiles, parts_of(coarse.total, _PART_TILES), points, points.view(np.uint32), boxes, count, start, lists,
         coarse, fine, large, shape, traffic, image, depth, overdraw, table,

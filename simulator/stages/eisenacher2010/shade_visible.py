@@ -27,7 +27,7 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import BlockSh
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     BACKGROUND,
     COLUMN,
-    MOST_TESTS,
+    TOGETHER,
     add_tests,
     color_of,
     new_tests,
@@ -62,18 +62,18 @@ _E = PixelEvent
 def _blend(part: int, parts: int, ids: Any, points: Any, words: Any, shape: BlockShape, image: Any) -> None:
     """Colours of the pixels of some rows: each quad is evaluated again at the one sample that sees it."""
     height, width = ids.shape
-    tests, below = new_tests(), np.uint64(shape.grid)
+    tests = new_tests()
     for y in range(height * part // parts, height * (part + 1) // parts):
-        for first in range(0, width, MOST_TESTS):
-            number = 0
-            for x in range(first, min(first + MOST_TESTS, width)):
+        for first in range(0, width, TOGETHER):
+            number = np.uint64(0)
+            for x in range(first, min(first + TOGETHER, width)):
                 if ids[y, x] != BACKGROUND:
-                    number = add_tests(tests, number, points, np.uint64(ids[y, x]), below, (x, x, 0, 0))
+                    number = add_tests(tests, number, np.uint64(ids[y, x]), (x, x, 0, 0))
                 for channel in range(3):
                     image[y, x, channel] = (BACKGROUND >> np.uint32(8 * channel)) & np.uint32(255)
-            run_tests(tests, number, None, (0, y), shape)
-            for k in range(number):
-                color, x = color_of(tests, k, words, below), int(tests.rows[COLUMN + k])
+            run_tests(tests, np.int64(number), points, None, (0, y), shape)
+            for k in range(np.int64(number)):
+                color, x = color_of(tests, np.uint64(k), words, np.uint64(shape.grid)), int(tests.rows[COLUMN + k])
                 for channel in range(3):
                     image[y, x, channel] = (color >> np.uint32(8 * channel)) & np.uint32(255)
 
@@ -174,7 +174,7 @@ def shade_visible(
     vertices = grids.vertices.copy()
     vertices[kept, :, 3] = shaded.vertices[:, :, 3]
     image = np.empty((height, width, 3), np.uint8)
-    shape, points = block_shape(8, 1, simt, box_tests=True, loaded=False, grid=side), vertices.reshape(-1, 4)
+    shape, points = block_shape(8, 1, simt, box_tests=True, loaded=False, grid=side), vertices.reshape(-1)
     for_parts(_blend, parts_of(height), ids, points, points.view(np.uint32), shape, image)
     works = (
         pixel_work("mark_grids", ids, side, np.array([0]), len(marks), simt),

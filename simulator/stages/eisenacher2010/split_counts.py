@@ -151,12 +151,11 @@ def _entries(lanes: int, coalescing: Any, addresses: Any) -> tuple[int, int]:
     return count, size
 
 
-@kernel
-def _count_blocks(
-    part: int, parts: int, patch: Any, path: Any, places: Any, warp: int, coalescing: Any, table: Any
+@kernel(lent=True)
+def _count_part(
+    part: int, parts: int, patch: Any, path: Any, places: Any, warp: int, coalescing: Any, table: Any, addresses: Any
 ) -> None:
-    """Events of the blocks of one part; of the subdivision where ``places`` are given."""
-    addresses = np.empty(warp, np.int64)
+    """``_count_blocks``, with scratch for one warp."""
     entries = _entries(warp, coalescing, addresses)
     for block in range(part * table.shape[0] // parts, (part + 1) * table.shape[0] // parts):
         end = min((block + 1) * BLOCK, path.shape[0])
@@ -168,6 +167,14 @@ def _count_blocks(
                 _count_oracle_warp(first, lanes, patch, path, entries, coalescing, addresses, table[block])
             else:
                 _count_subdivide_warp(first, lanes, path, places, entries, coalescing, addresses, table[block])
+
+
+@kernel
+def _count_blocks(
+    part: int, parts: int, patch: Any, path: Any, places: Any, warp: int, coalescing: Any, table: Any
+) -> None:
+    """Events of the blocks of one part; of the subdivision where ``places`` are given."""
+    _count_part(part, parts, patch, path, places, warp, coalescing, table, np.empty(warp, np.int64))
 
 
 def _blocks(threads: int) -> int:

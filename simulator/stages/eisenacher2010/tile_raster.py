@@ -85,14 +85,15 @@ def _raster_tiles(
         first, grids = np.int64(start[block]), np.int64(count[block])
         row = None if table is None else table[block]
         origin = (np.float64(column * shape.tile), np.float64(tile_row * shape.tile))
-        samples.depth[:] = FAR
-        samples.color[:] = BACKGROUND
-        samples.hits[:] = 0
-        raster_grids(points, words, stored, lists, first, first + grids, origin, shape, samples, quads, tests, row)
-        resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
-        if ids is not None:
-            y, x = tile_row * shape.tile, column * shape.tile
-            ids[y : y + size, x : x + size] = samples.color[: height - y, : width - x]
+        if grids > 0:
+            samples.depth[:] = FAR
+            samples.color[:] = BACKGROUND
+            samples.hits[:] = 0
+            raster_grids(points, words, stored, lists, first, first + grids, origin, shape, samples, quads, tests, row)
+            resolve(samples, shape.side, column * shape.tile, tile_row * shape.tile, image, depth, overdraw)
+            if ids is not None:
+                y, x = tile_row * shape.tile, column * shape.tile
+                ids[y : y + size, x : x + size] = samples.color[: height - y, : width - x]
         if row is not None:
             count_block(block, lists, first, grids, shape, traffic, row)
             count_stores(column * shape.tile, tile_row * shape.tile, width, height, shape, addresses, stores, row)
@@ -218,11 +219,12 @@ def tile_raster(
         raise TilestampError(f"tile_raster needs warps of 16, 32 or 64 lanes, not {simt.warp}")
     shape = shape_for(vertices, tiles, simt, spp=spp, box_tests=box_tests, edges=edges)
     image = np.empty((height, width, 3), np.uint8)
-    depth = np.empty((height, width), np.float32)
-    overdraw = np.empty((height, width), np.int32) if counting else None
+    image[:] = np.tile(np.frombuffer(BACKGROUND.tobytes(), np.uint8)[:3], (width, 1))  # by rows, which is quick
+    depth = np.full((height, width), FAR)
+    overdraw = np.zeros((height, width), np.int32) if counting else None
     table = np.zeros((tiles.total, len(_E)), np.int64) if counting else None
     traffic = block_traffic(shape, simt)
-    points = vertices.reshape(-1, 4)
+    points = vertices.reshape(-1)
     words = None if ids else points.view(np.uint32)
     stored = stored_edges(vertices, edges) if edges in {"half", "fixed"} else None
     seen = np.full((height, width), BACKGROUND, np.uint32) if ids else None

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tilestamp.models.bits import lowest_bit, popcount
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_events import BlockShape, TileRasterEvent, box_warps
 from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
@@ -19,110 +20,99 @@ from tilestamp.simulator.stages.eisenacher2010.tile_raster_samples import (
     keep_visible,
     run_tests,
 )
+from tilestamp.simulator.stages.prefetch import prefetch
+from tilestamp.simulator.stages.vectors import COUNT, bits, ceil, floor, larger, load, load_vertices, smaller, store
 
 LANES = 256  # vertices side by side: those of one grid at least
-_ROW = LANES + 16  # a coordinate: the last quad has its third vertex a row of vertices further
-_X, _Y, _X0, _Y0, _X1, _Y1, _LEFT, _TOP, _RIGHT, _BOTTOM = (_ROW * row for row in range(10))
-_ROWS = 10 * _ROW
-_HALF, _ZERO, _ONE = (np.float32(x) for x in (0.5, 0, 1))
+_ROW = LANES + 2 * COUNT  # a coordinate: the last quad has its third vertex a row of vertices further
+_X, _Y, _LEFT, _TOP, _RIGHT, _BOTTOM = (_ROW * row for row in range(6))
+_HALF, _ZERO = np.float32(0.5), np.float32(0)
+_ALL = np.uint64(0xFFFF)  # lanes
+_AHEAD, _LINE = 8, 16  # grids; numbers in a line of the cache
 _E = TileRasterEvent
 
 
 class Quads(NamedTuple):
     """Scratch of quads side by side, by their first vertex."""
 
-    rows: NDArray[np.float32]  # vertices, boxes, and first and last samples inside; one buffer, as in ``shading``
-    quad: NDArray[np.bool_]  # (LANES,) whether a quad begins at the vertex
+    rows: NDArray[np.float32]  # vertices, and first and last samples inside
+    quad: NDArray[np.uint64]  # bits of the lanes of each vector at which a quad begins
     grid: NDArray[np.uint8]  # (LANES,) which grid it is of
     vertex: NDArray[np.uint8]  # (LANES,) which vertex of it
-    sampled: NDArray[np.bool_]  # (LANES,) whether the box holds a sample
-    found: NDArray[np.int64]  # (LANES,) lanes where it does
 
 
 @kernel
 def new_quads(side: int) -> Quads:
     """Scratch for grids of ``side`` vertices a side."""
-    lane = np.arange(LANES)
-    vertex = lane % (side * side)
-    quad = (vertex % side < side - 1) & (vertex < side * (side - 1))
+    vertices, quad = side * side, np.zeros(LANES // COUNT, np.uint64)
+    vertex = np.arange(LANES) % vertices
+    for lane in range(LANES):
+        if vertex[lane] % side < side - 1 and vertex[lane] < vertices - side:
+            quad[lane // COUNT] |= np.uint64(1) << np.uint64(lane % COUNT)
     return Quads(
-        np.zeros(_ROWS, np.float32),
-        quad,
-        (lane // (side * side)).astype(np.uint8),
-        vertex.astype(np.uint8),
-        np.zeros(LANES, np.bool_),
-        np.zeros(LANES, np.int64),
+        np.zeros(6 * _ROW, np.float32), quad, (np.arange(LANES) // vertices).astype(np.uint8), vertex.astype(np.uint8)
     )
 
 
 @kernel(lent=True)
-def _set_boxes(s: Any, lanes: int, side: int) -> None:
-    """Boxes of the quads that begin at each vertex."""
-    b, c, d = s[1:], s[side + 1 :], s[side:]
-    for n in range(lanes):
-        s[_X0 + n], s[_X1 + n] = min(s[n], b[n], c[n], d[n]), max(s[n], b[n], c[n], d[n])
-    for n in range(lanes):
-        ay, by, cy, dy = s[_Y + n], b[_Y + n], c[_Y + n], d[_Y + n]
-        s[_Y0 + n], s[_Y1 + n] = min(ay, by, cy, dy), max(ay, by, cy, dy)
+def _take(points: Any, lists: Any, first: int, grids: int, vertices: int, s: Any) -> None:
+    """Lay the vertices of some grids side by side; those some grids further in the list are fetched meanwhile."""
+    for g in range(grids):
+        ahead = 4 * np.int64(lists[min(first + g + _AHEAD, lists.size - 1)]) * vertices
+        for line in range(0, 4 * vertices, _LINE):
+            prefetch(points, ahead + line)
+        at, place = np.int64(lists[first + g]) * vertices, g * vertices
+        for v in range(0, vertices - COUNT + 1, COUNT):
+            x, y, _, _ = load_vertices(points, 4 * (at + v))
+            store(s, _X + place + v, x)
+            store(s, _Y + place + v, y)
+        for v in range(vertices - vertices % COUNT, vertices):
+            s[_X + place + v], s[_Y + place + v] = points[4 * (at + v)], points[4 * (at + v) + 1]
 
 
-@kernel(lent=True)
-def _set_spans(s: Any, lanes: int, quad: Any, sampled: Any, left: Any, top: Any, side: Any, last: Any) -> None:
-    """First and last column and row of the tile's samples inside each box, ``side`` a pixel.
+@kernel(lent=True, inline=True)
+def _box(s: Any, n: int, side: int) -> Any:
+    """Least and greatest coordinate of the quads that begin at sixteen vertices."""
+    a, b, c, d = load(s, n), load(s, n + 1), load(s, n + side + 1), load(s, n + side)
+    return smaller(smaller(smaller(a, b), c), d), larger(larger(larger(a, b), c), d)
+
+
+@kernel(lent=True, inline=True)
+def _span(low: Any, high: Any, side: Any, first: Any, last: Any) -> Any:
+    """First and last of a tile's samples between two coordinates, ``side`` a pixel.
 
     Exactly those at ``(i + 0.5) / side`` that compare as inside: subtracting a half rounds only what lies less than
     half a sample from zero, and never past it.
     """
-    for n in range(lanes):
-        i0, i1 = np.ceil(s[_X0 + n] * side - _HALF) - left, np.floor(s[_X1 + n] * side - _HALF) - left
-        j0, j1 = np.ceil(s[_Y0 + n] * side - _HALF) - top, np.floor(s[_Y1 + n] * side - _HALF) - top
-        i0, j0, i1, j1 = max(i0, _ZERO), max(j0, _ZERO), min(i1, last), min(j1, last)
-        s[_LEFT + n], s[_TOP + n], s[_RIGHT + n], s[_BOTTOM + n] = i0, j0, i1, j1
-        sampled[n] = (i0 <= i1) & (j0 <= j1) & quad[n]
+    return larger(ceil(low * side - _HALF) - first, _ZERO), smaller(floor(high * side - _HALF) - first, last)
 
 
-@kernel(lent=True)
-def _count_passes(s: Any, lanes: int, quad: Any, left: Any, top: Any, size: Any) -> Any:
-    """Boxes that touch a sub-tile."""
-    passes, right, bottom = np.int32(0), left + size, top + size
-    for n in range(lanes):
-        beside = (s[_X1 + n] < left) | (s[_X0 + n] > right) | (s[_Y1 + n] < top) | (s[_Y0 + n] > bottom)
-        passes = np.int32(passes + np.int32(quad[n] & (not beside)))
+@kernel(lent=True, inline=True)
+def _count_passes(x: Any, y: Any, quads: Any, left: Any, top: Any, shape: BlockShape) -> Any:
+    """Pairs of a box and a sub-tile that it touches."""
+    passes, size = 0, np.float32(shape.subtile)
+    for sub in range(shape.side * shape.side):
+        i = left + np.float32(sub & (shape.side - 1)) * size
+        j = top + np.float32(sub >> shape.side_bits) * size
+        beside = (x[1] < i) | (x[0] > i + size) | (y[1] < j) | (y[0] > j + size)
+        passes += popcount(quads & ~bits(beside))
     return passes
 
 
 @kernel(lent=True)
-def _box_quads(
-    points: Any, lists: Any, first: int, grids: int, origin: Any, shape: BlockShape, q: Quads, row: Any
-) -> Any:
-    """Scan the boxes of some grids' quads; the number of those that hold samples, which ``q.found`` lists."""
-    s, vertices, lanes = q.rows, shape.grid * shape.grid, grids * shape.grid * shape.grid
-    for g in range(grids):
-        grid = np.uint64(lists[first + g]) * np.uint64(vertices)
-        for v in range(vertices):
-            place = np.uint64(g * vertices + v)
-            s[place], s[place + np.uint64(_Y)] = points[grid + np.uint64(v), 0], points[grid + np.uint64(v), 1]
-    side, left, top = np.float32(shape.side), np.float32(origin[0]), np.float32(origin[1])
-    _set_boxes(s, lanes, shape.grid)
-    _set_spans(s, lanes, q.quad, q.sampled, left * side, top * side, side, np.float32(shape.tile * shape.side - 1))
-    if row is not None:
-        size = np.float32(shape.subtile)
-        for sub in range(shape.side * shape.side):
-            i, j = np.float32(sub & (shape.side - 1)), np.float32(sub >> shape.side_bits)
-            row[_E.SUBTILE_PASS] += _count_passes(s, lanes, q.quad, left + i * size, top + j * size, size)
-    found = 0
-    for n in range(lanes):
-        q.found[found] = n
-        found += q.sampled[n]
-    return found
-
-
-@kernel(lent=True)
 def _draw_tests(
-    t: Tests, number: int, words: Any, stored: Any, origin: Any, shape: BlockShape, samples: Samples, row: Any
+    t: Tests,
+    number: int,
+    points: Any,
+    words: Any,
+    stored: Any,
+    origin: Any,
+    shape: BlockShape,
+    samples: Samples,
+    row: Any,
 ) -> None:
     """Test what has come together, and keep what is nearest."""
-    run_tests(t, number, stored, origin, shape)
+    run_tests(t, number, points, stored, origin, shape)
     counts = keep_visible(t, number, words, shape, samples, row)
     if row is not None:
         row[_E.BOX_LANES] += number
@@ -148,24 +138,40 @@ def raster_grids(
     row: Any,
 ) -> None:
     """Grids first..last-1 of the lists in one tile: for each quad the samples in its box, sub-tile by sub-tile."""
-    tile, number, together = shape.tile, 0, LANES // (shape.grid * shape.grid)
+    tile, vertices, s, number = shape.tile, shape.grid * shape.grid, q.rows, np.uint64(0)
+    lefts, rights, tops, bottoms = s[_LEFT:], s[_RIGHT:], s[_TOP:], s[_BOTTOM:]
+    side, left, top = np.float32(shape.side), np.float32(origin[0]), np.float32(origin[1])
+    most, together = np.float32(tile * shape.side - 1), LANES // vertices
     for base in range(first, last, together):
-        for k in range(_box_quads(points, lists, base, min(last - base, together), origin, shape, q, row)):
-            n = q.found[k]
-            vertex = np.uint64(lists[base + np.int64(q.grid[n])]) * np.uint64(shape.grid * shape.grid) + np.uint64(
-                q.vertex[n]
-            )
-            i0, i1 = int(q.rows[_LEFT + n]), int(q.rows[_RIGHT + n])
-            j0, j1 = int(q.rows[_TOP + n]), int(q.rows[_BOTTOM + n])
-            for sub in range(shape.side * shape.side):
-                i, j = (sub & (shape.side - 1)) * tile, (sub >> shape.side_bits) * tile
-                span = (max(i0, i), min(i1, i + tile - 1), max(j0, j), min(j1, j + tile - 1))
-                if span[0] > span[1] or span[2] > span[3]:
-                    continue
-                if row is not None:
-                    row[_E.BOX_WARPS] += box_warps(span, shape)
-                number = add_tests(t, number, points, vertex, np.uint64(shape.grid), span)
-                if number >= TOGETHER:
-                    _draw_tests(t, number, words, stored, origin, shape, samples, row)
-                    number = 0
-    _draw_tests(t, number, words, stored, origin, shape, samples, row)
+        grids = min(last - base, together)
+        _take(points, lists, base, grids, vertices, s)
+        for n in range(0, grids * vertices, COUNT):
+            x, y, quads = _box(s, _X + n, shape.grid), _box(s, _Y + n, shape.grid), q.quad[n // COUNT]
+            quads &= _ALL >> np.uint64(max(0, n + COUNT - grids * vertices))
+            (i0, i1), (j0, j1) = _span(*x, side, left * side, most), _span(*y, side, top * side, most)
+            if row is not None:
+                row[_E.SUBTILE_PASS] += _count_passes(x, y, quads, left, top, shape)
+            quads &= bits((i0 <= i1) & (j0 <= j1))
+            if quads == np.uint64(0):
+                continue
+            store(s, _LEFT + n, i0)
+            store(s, _RIGHT + n, i1)
+            store(s, _TOP + n, j0)
+            store(s, _BOTTOM + n, j1)
+            while quads != np.uint64(0):
+                k = np.uint64(n + lowest_bit(quads))
+                quads &= quads - np.uint64(1)
+                vertex = np.uint64(lists[base + np.int64(q.grid[k])]) * np.uint64(vertices) + np.uint64(q.vertex[k])
+                box = (int(lefts[k]), int(rights[k]), int(tops[k]), int(bottoms[k]))
+                for sub in range(shape.side * shape.side):
+                    i, j = (sub & (shape.side - 1)) * tile, (sub >> shape.side_bits) * tile
+                    span = (max(box[0], i), min(box[1], i + tile - 1), max(box[2], j), min(box[3], j + tile - 1))
+                    if span[0] > span[1] or span[2] > span[3]:
+                        continue
+                    if row is not None:
+                        row[_E.BOX_WARPS] += box_warps(span, shape)
+                    number = add_tests(t, number, vertex, span)
+                    if number >= TOGETHER:
+                        _draw_tests(t, np.int64(number), points, words, stored, origin, shape, samples, row)
+                        number = np.uint64(0)
+    _draw_tests(t, np.int64(number), points, words, stored, origin, shape, samples, row)
