@@ -96,6 +96,17 @@ def test_long_rows_are_covered_where_all_edge_functions_say_so():
     assert work.total(E.SAMPLE_HITS) == hits > 50_000
 
 
+def test_hits_are_the_pixels_drawn_where_a_corner_is_beyond_all_bounds():
+    """The inverse of so small a w is infinite, and so are the corner's coordinates."""
+    corners = [
+        [-5.590048594e-41, -8.9886160955e-41, 0, 1e-40],
+        [0.646866, 0.94461876, 0, 1],
+        [-0.7488851, 0.7196617, 0, 1],
+    ]
+    frame, (work,), _ = freepipe(np.array(corners, np.float32), np.array([[0, 1, 2]], np.int32), 64, 48, Simt())
+    assert work.counts()["SAMPLE_HITS"] == (frame.ids >= 0).sum() > 0
+
+
 def test_lanes_at_the_same_pixel_conflict():
     positions, triangles = flat(TINY * 32)
     _, (work,), _ = freepipe(positions, triangles, 64, 64, Simt())

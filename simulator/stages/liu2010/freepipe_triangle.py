@@ -19,6 +19,7 @@ NOTHING, INSIDE, CLIPPED = 0, 1, 2  # what a thread does with its triangle
 PLANES = 6
 SUBPIXEL_BITS = 4
 MAX_POLYGON = 10
+FARTHEST = 1 << 24  # sub-pixels from the centre, beyond all bands; edge functions stay below 2**53, exact in float64
 _PART_TRIANGLES = 4096  # at least
 _F0, _F1 = np.float32(0), np.float32(1)
 Band = tuple[np.float32, np.float32]
@@ -113,11 +114,16 @@ def _pixels(a: int, b: int, c: int, bits: int, size: int) -> tuple[int, int]:
 
 @kernel(error_model="numpy", lent=True)
 def _project(vertex: Any, width: int, height: int, bits: int, place: Any) -> Any:
-    """Project a clip position and snap it to ``place``, sub-pixels; returns its depth."""
+    """Project a clip position and snap it to ``place``, sub-pixels; returns its depth.
+
+    Where w is so near 0 that its inverse is infinite, a vertex inside of the band can come out beyond ``FARTHEST``.
+    """
     half = 1 << (bits - 1)
     r = _F1 / vertex[3]
-    place[0] = round_to_int32(vertex[0] * r * np.float32(half * width)) + half * width
-    place[1] = round_to_int32(vertex[1] * r * np.float32(half * height)) + half * height
+    x = round_to_int32(vertex[0] * r * np.float32(half * width))
+    y = round_to_int32(vertex[1] * r * np.float32(half * height))
+    place[0] = min(max(x, -FARTHEST), FARTHEST) + half * width
+    place[1] = min(max(y, -FARTHEST), FARTHEST) + half * height
     return vertex[2] * r
 
 
