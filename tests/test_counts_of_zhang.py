@@ -13,6 +13,7 @@ from tilestamp import simulate
 from tilestamp.models.machine import load_machine
 from tilestamp.simulator.scenes.geometry import Mesh
 from tilestamp.simulator.scenes.scene import Scene
+from tilestamp.simulator.stages.zhang2025.depth import depth_24_bit
 from tilestamp.simulator.stages.zhang2025.frame_clears import cleared_bytes
 from tilestamp.simulator.stages.zhang2025.primitive_binning import PrimitiveBinningEvent, primitive_binning
 
@@ -167,6 +168,12 @@ def test_hi_z_rejects_what_lies_behind_a_round_before():
     counts = drawn(halves(near=256))["CoarseRasterizer"].counts()
     assert counts["HI_Z_REJECTED"] == INSIDE * FAR
     assert counts["ENTRIES"] == MET * 256 + (MET - INSIDE) * FAR
+
+
+@pytest.mark.small
+def test_a_depth_that_is_no_number_is_nearest():
+    """As conversions of the original's machine do."""
+    assert depth_24_bit(np.float32(np.nan)) == 0
 
 
 @pytest.mark.parametrize(("faults", "margin"), [(True, 0), (False, 4)])

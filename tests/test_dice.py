@@ -40,13 +40,14 @@ def colors(grids):
     return np.ascontiguousarray(grids.vertices[:, :, 3]).view(np.uint8).reshape(len(grids.vertices), 16, 4)
 
 
+@pytest.mark.small
 def test_positions_and_depths_are_those_of_a_slow_evaluation():
     rng = np.random.default_rng(7)
     points = np.repeat(flat(), 2, axis=0)
     points[..., :3] += rng.uniform(-0.3, 0.3, (2, 16, 3)).astype(np.float32)
     weights = rng.uniform(0.5, 2.0, (2, 16, 1)).astype(np.float32)
     rational = points * weights
-    entries = [(0, 0, 0, 0), (1, 2, 3, 1), (0, 5, 31, 0)]
+    entries = [(0, 0, 0, 0), (1, 2, 3, 1), (0, 5, 31, 0), (1, 9, 300, 17)]
     matrix = VIEW.matrix(*SIZE)
     for net in (points, rational):
         grids, _, _ = dice(net, squares(*entries), matrix, *SIZE, GTX280, counting=False)

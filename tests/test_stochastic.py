@@ -78,6 +78,13 @@ def test_every_sample_is_that_of_fractions(behind, lens):
         assert samples.polygon.reshape(HEIGHT, WIDTH, SPP)[y, x, s] == expected, (x, y, s)
 
 
+@pytest.mark.small
+def test_a_triangle_whose_place_is_no_number_meets_no_tile():
+    triangles = soup(1)
+    triangles.corners[..., :2] = np.nan
+    assert len(visit_tiles(triangles, intervals_of(pattern_of_eighths()), SPP, WIDTH, HEIGHT, TILE).tiles) == 0
+
+
 def test_depth_is_that_of_fractions():
     triangles, pattern = soup(1, seed=8), pattern_of_eighths()
     samples, _ = draw(triangles, everywhere(triangles), pattern)

@@ -80,10 +80,11 @@ def _boxes(corners: Any, aperture: Any, focus: Any, width: int, height: int, til
                 blur = abs(aperture * (w - focus) / w) + MARGIN
                 low_x, high_x = min(low_x, x / w - blur), max(high_x, x / w + blur)
                 low_y, high_y = min(low_y, y / w - blur), max(high_y, y / w + blur)
-        boxes[p, 0], boxes[p, 2] = max(low_x, 0.0) // tile, min(high_x, width - 1.0) // tile
-        boxes[p, 1], boxes[p, 3] = max(low_y, 0.0) // tile, min(high_y, height - 1.0) // tile
         if low_x >= width or low_y >= height or high_x < 0 or high_y < 0:
             boxes[p, 0], boxes[p, 1], boxes[p, 2], boxes[p, 3] = 0, 0, -1, -1
+            continue
+        boxes[p, 0], boxes[p, 2] = max(low_x, 0.0) // tile, min(high_x, width - 1.0) // tile
+        boxes[p, 1], boxes[p, 3] = max(low_y, 0.0) // tile, min(high_y, height - 1.0) // tile
         boxes[p, 2], boxes[p, 3] = min(boxes[p, 2], last_x), min(boxes[p, 3], last_y)
 
 

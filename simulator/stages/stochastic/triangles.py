@@ -132,7 +132,7 @@ def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
         w += weights[k] * seen[k, 2]
     if (w > 0) != (total > 0) or w == 0 or abs(z) > abs(w):
         return np.float32(-1.0)
-    return np.float32(0.5 + 0.5 * (z / w))
+    return np.float32(0.5 + 0.5 * np.float64(z / w))
 
 
 @kernel(lent=True)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.kernel import kernel
+from tilestamp.simulator.stages.laine2011.exact import greater
 from tilestamp.simulator.stages.zhang2025.triangle_setup import DEPTH, evaluate
 
 DEPTH_STEPS = np.float32(2**24 - 1)
@@ -24,8 +25,8 @@ _ONE = np.float32(1.0)
 
 @kernel(error_model="numpy", lent=True)
 def depth_24_bit(z: Any) -> int:
-    """Round a depth in [0, 1] as the original keeps it."""
-    return int(min(max(z, _ZERO), _ONE) * DEPTH_STEPS)
+    """Round a depth in [0, 1] as the original keeps it; what is not a number is 0."""
+    return int(min(greater(z, _ZERO), _ONE) * DEPTH_STEPS)
 
 
 @kernel(error_model="numpy", lent=True)
