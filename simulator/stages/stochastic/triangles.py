@@ -126,13 +126,13 @@ def covers(seen: Any, weights: Any) -> bool:
 @kernel(lent=True)
 def depth_of(corners: Any, p: int, time: Any, seen: Any, weights: Any) -> Any:
     """Depth of a covered sample, 0 near to 1 far; -1 where it lies behind the eye, or before near or behind far."""
-    z, w, total = weights[0] * 0, weights[0] * 0, weights[0] + weights[1] + weights[2]
+    z, w, total = np.float64(0), np.float64(0), weights[0] + weights[1] + weights[2]
     for k in range(3):
         z += weights[k] * (corners[p, 0, k, 2] + time * corners[p, 1, k, 2])
         w += weights[k] * seen[k, 2]
     if (w > 0) != (total > 0) or w == 0 or abs(z) > abs(w):
         return np.float32(-1.0)
-    return np.float32(0.5 + 0.5 * np.float64(z / w))
+    return np.float32(0.5 + 0.5 * (z / w))
 
 
 @kernel(lent=True)
