@@ -140,6 +140,7 @@ def test_nothing_to_be_seen_is_said_on_the_terminal(tmp_path, capsys):
     [
         ("micropolygon", "gtx280", {"tile": 32}, "512 threads a block, not 1024; it can launch tile 4, 8 or 16"),
         ("micropolygon", "gtx480", {"tile": 32, "spp": 16}, "it can launch tile 4, 8 or 16, or spp 1 or 4"),
+        ("stamps", "gtx280", {"merge_entries": 256}, "at most 16368 bytes of shared memory, not 49152; gtx480, h200"),
         ("tiled", "gtx280", {"tile": 32}, "it can launch tile 4 to 16"),
         ("freepipe", "gtx280", {"block": 1024}, "it can launch block 32 to 512"),
     ],

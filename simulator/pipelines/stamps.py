@@ -16,6 +16,7 @@ Not modelled
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
@@ -29,7 +30,8 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygons import micropolygon
 from tilestamp.simulator.stages.fatahalian2009.sample_positions import sample_positions
 from tilestamp.simulator.stages.fatahalian2009.stamps import Touch, stamp_shape
 from tilestamp.simulator.stages.fatahalian2009.stamps import stamps as draw_stamps
-from tilestamp.simulator.stages.fatahalian2010.quad_shading import quad_shading
+from tilestamp.simulator.stages.fatahalian2010.quad_shading import QuadEvent, quad_shading, quad_work
+from tilestamp.simulator.work import Work
 
 Pixels = Annotated[int, Meta(ge=1, le=1024)]
 Pair = Annotated[tuple[Pixels, ...], Meta(min_length=2, max_length=2)]  # tuple[Pixels, Pixels] crashes msgspec 0.23
@@ -50,6 +52,12 @@ class StampsOptions(MicropolygonInput, frozen=True, kw_only=True):
     none: shading is no part of the frame, and every sample has the colour of its own micropolygon."""
     merge_shared: Literal[0, 1, 2] = 1
     """Vertices that neighbours share, at least: an edge (2), a corner (1), or none (0: all merge that face alike)."""
+
+    def launches(self, simt: Simt) -> list[Work]:
+        """Quads that are merged wait in shared memory."""
+        if self.merge_entries is None:
+            return []
+        return [quad_work(np.zeros((0, len(QuadEvent)), np.int64), self.merge_entries, simt)]
 
 
 def stamps(

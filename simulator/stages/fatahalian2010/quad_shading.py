@@ -29,6 +29,7 @@ from tilestamp.simulator.stages.fatahalian2009.micropolygon_samples import Sampl
 from tilestamp.simulator.stages.fatahalian2009.micropolygons import Micropolygons
 from tilestamp.simulator.stages.fatahalian2009.warp_queue import warp_queue
 from tilestamp.simulator.stages.fatahalian2010.merge_buffer import PIXELS, MergeBuffer, find, join, new_buffer, start
+from tilestamp.simulator.work import Work
 
 BATCH = 1024  # polygons that a warp takes from the queue together
 QUAD_BYTES = 16  # polygon, place, covered samples: written by the rasterizer, read here; both are counted here
@@ -116,8 +117,12 @@ def quad_shading(
         Stream("quads", "store", quads, quads),
         Stream("colors", "store", colors, min(colors, COLOR_BYTES * len(shaded.seen))),
     )
-    work = warp_queue("quad_shading", QuadEvent, table, simt, shared_bytes=ENTRY_BYTES * entries, streams=streams)
-    return StageResult(shaded, (work,))
+    return StageResult(shaded, (quad_work(table, entries, simt, streams),))
+
+
+def quad_work(table: NDArray[np.int64], entries: int, simt: Simt, streams: tuple[Stream, ...] = ()) -> Work:
+    """A warp a batch; its quads wait in shared memory until they are merged."""
+    return warp_queue("quad_shading", QuadEvent, table, simt, shared_bytes=ENTRY_BYTES * entries, streams=streams)
 
 
 @kernel
