@@ -1,5 +1,8 @@
 """Sixteen numbers at once: compiled vectors against the plain Python beside them, bit by bit."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -95,3 +98,15 @@ def test_numbers_are_gathered_by_four():
     )
     assert _gather(a, places, out) == 0xFFFF ^ 0b100
     np.testing.assert_array_equal(out, 4 * places[2:18].astype(np.float32) + 3)
+
+
+def test_kernels_of_numbers_compile_also_where_vectors_are_imported_later():
+    """What is compiled for vectors is not taken for numbers."""
+    code = """
+from numba import float32, njit
+njit(float32(float32, float32))(lambda a, b: a * b if a < b else -a)
+import tilestamp.simulator.stages.vectors
+print(njit(float32(float32, float32))(lambda a, b: a * b + a / b - b if a < b else -a)(2, 4))
+"""
+    command = [sys.executable, "-c", code]
+    assert subprocess.run(command, capture_output=True, check=False, text=True).stdout.strip() == "4.5"  # noqa: S603 - our own

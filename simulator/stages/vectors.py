@@ -175,7 +175,8 @@ def _compile(function: Any, returned: Any, *wanted: Any) -> Callable[[Callable[.
 
         infer_global(function)(Template)
         for kinds in product(*[(Lanes, types.Float) if kind == _NUMBERS else (kind,) for kind in wanted]):
-            lower_builtin(function, *kinds)(lowered)
+            if function is spread or set(kinds) != {types.Float}:  # what numbers do is Numba's
+                lower_builtin(function, *kinds)(lowered)
 
     return register
 
