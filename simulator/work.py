@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
 
+
 def column_sums(table: NDArray[np.int64]) -> list[int]:
     """Sum of each column, all in one pass over a table of many rows."""
     sums: list[int] = np.einsum("ij->j", table).tolist()

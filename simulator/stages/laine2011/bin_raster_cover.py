@@ -83,7 +83,8 @@ def find_slots(entries: Any, misc: Any, boxes: WarpBoxes) -> bool:
 @kernel(lent=True, inline=True)
 def _squares(a: Any, b: Any, c: Any, move: int, shift: int, last: int) -> Any:
     """First square, and how many, between three places on an axis."""
-    low, high = np.int32(np.int32(min(a, b, c) + move) >> shift), np.int32(np.int32(max(a, b, c) + move) >> shift)
+    low: Any = np.int32(np.int32(min(a, b, c) + move) >> shift)
+    high: Any = np.int32(np.int32(max(a, b, c) + move) >> shift)
     first: Any = min(max(low, np.int32(0)), np.int32(last))
     return first, np.int32(min(max(high, np.int32(0)), np.int32(last)) - first + 1)
 
@@ -108,7 +109,9 @@ def warp_boxes(
         header = headers[np.uint64(boxes.slot[lane])]
         for k in range(6):
             corner[np.uint64(k * WARP + lane)] = header[k]
-    largest, area, side = np.int32(1), np.int32(0), np.int32(1)
+    largest: Any = np.int32(1)
+    area: Any = np.int32(0)
+    side: Any = np.int32(1)
     for lane in range(lanes):
         i = np.uint64(lane)
         x, columns = _squares(corner[i], corner[i + _64], corner[i + _128], move_x, shift, last_x)
@@ -147,10 +150,11 @@ def count_votes(boxes: WarpBoxes, steps: int) -> tuple[int, int]:
     """Shared ORs of a warp, one for each of its steps that has a vote, and their replays; the votes are forgotten."""
     ors, replays = 0, 0
     for step in range(steps):
-        votes, deepest = boxes.vote[step * WARP : (step + 1) * WARP], np.uint8(0)
+        votes = boxes.vote[step * WARP : (step + 1) * WARP]
+        deepest: Any = np.uint8(0)
         for bank in range(WARP):  # all at once
             deepest = max(deepest, votes[bank])
-        ors, replays = ors + (deepest > 0), replays + max(np.int64(deepest) - 1, 0)
+        ors, replays = ors + (deepest > 0), replays + max(int(deepest) - 1, 0)
         for bank in range(WARP):
             votes[bank] = 0
     return ors, replays
@@ -161,10 +165,11 @@ def count_corners(corners: Any) -> tuple[int, int]:
     """As ``count_votes``, of boxes that are at most 2 x 2: a step for each corner, a byte of each bank's number."""
     ors, replays = 0, 0
     for corner in range(4):
-        shift, deepest = np.int32(8 * corner), np.int32(0)
+        shift = np.int32(8 * corner)
+        deepest: Any = np.int32(0)
         for bank in range(WARP):
             deepest = max(deepest, np.int32(corners[bank] >> shift & np.int32(255)))
-        ors, replays = ors + (deepest > 0), replays + max(np.int64(deepest) - 1, 0)
+        ors, replays = ors + (deepest > 0), replays + max(int(deepest) - 1, 0)
     for bank in range(WARP):
         corners[bank] = 0
     return ors, replays
