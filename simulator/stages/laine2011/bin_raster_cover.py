@@ -120,7 +120,7 @@ def warp_boxes(
         squares = np.int32(columns * rows)
         largest, area = max(largest, squares), np.int32(area + squares)
         side = max(side, np.int32(columns), np.int32(rows))
-    return np.int64(largest), np.int64(area), np.int64(side)
+    return int(largest), int(area), int(side)
 
 
 @kernel(lent=True)
