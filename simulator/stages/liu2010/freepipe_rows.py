@@ -28,12 +28,12 @@ def take_boxes(pieces: Pieces, lanes: Lanes, shape: FrameShape, row: Any) -> int
         p = np.uint64(max(lanes.piece[lane], 0))
         x0, x1, y0, y1 = pieces.box[p, 0], pieces.box[p, 1], pieces.box[p, 2], pieces.box[p, 3]
         has = (lanes.piece[lane] >= 0) & (x1 >= x0) & (y1 >= y0)
-        rows, columns = (y1 - y0 + 1, x1 - x0 + 1) if has else (0, 0)
-        box[lane], box[WARP + lane], box[2 * WARP + lane], box[3 * WARP + lane] = x0, y0, rows, columns
+        box[lane], box[WARP + lane] = x0, y0
+        box[2 * WARP + lane], box[3 * WARP + lane] = (y1 - y0 + 1, x1 - x0 + 1) if has else (0, 0)
         for k in range(6):
             corner[k * WARP + lane] = pieces.corner[p, k]
     for lane in range(WARP):  # several at once
-        rows, columns = np.int64(box[2 * WARP + lane]), np.int64(box[3 * WARP + lane])
+        rows, columns = int(box[2 * WARP + lane]), int(box[3 * WARP + lane])
         box[4 * WARP + lane], box[5 * WARP + lane] = columns - (columns >> shift << shift), columns >> shift
         active += lanes.piece[lane] >= 0
         boxes += rows > 0
