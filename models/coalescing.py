@@ -66,6 +66,8 @@ def transactions(addresses: Any, lanes: int, access_bytes: int, rule: int) -> tu
     elif rule == WARP_LINES and access_bytes > WORD_BYTES:
         request = _lanes_of_a_line(access_bytes)
     rising = 0 if shrink else _rising_segments(addresses, lanes, request, segment)
+    if rising == 0 and not shrink and request >= lanes:
+        rising = _paired_segments(addresses, lanes, segment)
     if rising > 0:
         return rising, rising * segment
     count = 0
@@ -168,6 +170,24 @@ def _rising_segments(addresses: Any, lanes: int, request: int, segment_bytes: in
         falls |= addresses[i] < addresses[i - 1]
         count += ((addresses[i] ^ addresses[i - 1]) >= segment_bytes) | (i & apart == 0)
     return 0 if falls else count
+
+
+@kernel(lent=True)
+def _paired_segments(addresses: Any, lanes: int, segment_bytes: int) -> int:
+    """Distinct segments where neither the even lanes' addresses fall nor the odd ones', and theirs lie apart; else 0.
+
+    So lie the vertices of a strip of triangles, which takes them from two rows by turns.
+    """
+    if lanes < 2 or min(addresses[0], addresses[1]) < 0:
+        return 0
+    falls = False
+    count = 2
+    for i in range(2, lanes):  # in several lanes at once
+        falls |= addresses[i] < addresses[i - 2]
+        count += (addresses[i] ^ addresses[i - 2]) >= segment_bytes
+    one, other = addresses[lanes - 1] & -segment_bytes, addresses[lanes - 2] & -segment_bytes  # the last of each
+    first, second = addresses[(lanes - 1) & 1], addresses[lanes & 1]
+    return count if not falls and (first > other + segment_bytes - 1 or second > one + segment_bytes - 1) else 0
 
 
 @kernel(lent=True)

@@ -2,6 +2,7 @@
 
 from dataclasses import KW_ONLY, dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,13 @@ from numpy.typing import NDArray
 
 from tilestamp.models.counters import Counter, counters_of
 from tilestamp.models.launch import PipeLaunch, Stream
+
+
+def column_sums(table: NDArray[np.int64]) -> list[int]:
+    """Sum of each column, all in one pass over a table of many rows."""
+    sums: list[int] = np.einsum("ij->j", table).tolist()
+    return sums
+
 
 A_UNIT = -1  # of a grid: a block for each unit
 
@@ -79,14 +87,18 @@ class Work:
         """An event in each unit, where the stage counts it."""
         return [self.table[:, self.events[event]]] if event in self.events.__members__ else []
 
+    @cached_property
+    def totals(self) -> list[int]:
+        """Sum of each event over all units."""
+        return column_sums(self.table)
+
     def total(self, event: IntEnum) -> int:
         """Sum of one event over all units."""
-        return int(self.table[:, event].sum())
+        return self.totals[event]
 
     def counts(self) -> dict[str, int]:
         """Every event by name, summed over all units."""
-        totals = self.table.sum(axis=0).tolist()
-        return {event.name: totals[event] for event in self.events}
+        return {event.name: self.totals[event] for event in self.events}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -161,3 +161,20 @@ def test_a_half_warp_of_any_addresses_takes_the_segments_of_the_programming_guid
     lanes = [address for address in lanes if address % segment + size <= segment]  # unaligned, yet in one segment
     expected = list(halved(lanes, size))
     assert transactions(np.array(lanes, np.int64), len(lanes), size, SEGMENTS) == (len(expected), sum(expected))
+
+
+@given(
+    steps=st.lists(st.sampled_from([0, 0, 1, 1, 1, 2, 9, -1]), min_size=1, max_size=32),
+    falls=st.booleans(),
+    apart=st.integers(-120, 120),
+    rule=st.sampled_from([LINES, SECTORS]),
+)
+@settings(max_examples=300, deadline=None)
+def test_two_rows_of_vertices_by_turns_need_the_distinct_segments_of_both(steps, falls, apart, rule):
+    size = 16 if rule == SECTORS else 4  # a line takes 16 bytes of eight lanes alone
+    rows = np.cumsum([abs(step) if not falls else step for step in steps], dtype=np.int64)
+    rows[1::2] += apart
+    addresses = size * (rows + 400)
+    segment = 32 if rule == SECTORS else 128
+    count = len({address // segment for address in addresses.tolist()})
+    assert transactions(addresses, len(addresses), size, rule) == (count, count * segment)

@@ -174,7 +174,7 @@ def _draw_round(
             tile.mask[alive] = slot
             alive += 1
             opaque |= bit
-        _, written = draw_nearer(draw, tile, plane, record, opaque, column, line, None)
+        _, written = draw_nearer(draw, tile, plane, record, opaque, column, line, None, np.uint64(0))
         writes += popcount(written)
         longest = add_hits(tile.more, longest, written)
     state[FRAGMENTS] -= n

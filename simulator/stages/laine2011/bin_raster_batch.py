@@ -22,7 +22,7 @@ from tilestamp.simulator.stages.laine2011.bin_raster_count import (
     count_load,
     count_longest,
     count_segments,
-    count_visible,
+    visible_of,
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     BIN_SIDE_LOG2,
@@ -33,15 +33,15 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     WarpBoxes,
     X,
     Y,
-    entry_slot,
+    count_votes,
+    find_slots,
     header_load,
     lane_edges,
     new_boxes,
-    room_for,
-    small_votes,
+    row_ends,
     touches,
-    walk_votes,
     warp_boxes,
+    with_room,
 )
 from tilestamp.simulator.stages.laine2011.bin_raster_events import BinRasterEvent
 
@@ -67,17 +67,26 @@ class BinScratch(NamedTuple):
 
     ring: NDArray[np.int64]  # (RING,) queue entries
     before: NDArray[np.int64]  # (bins,) entries before the round
-    stamp: NDArray[np.int64]  # (steps, bins) last warp and memory segment that wrote to the bin at that step
-    warps: NDArray[np.int64]  # (2,) warps and segments so far
+    stamp: NDArray[np.int64]  # (bins, bins) at each step last warp and memory segment that wrote to a bin
+    warps: NDArray[np.int64]  # (3,) warps and segments so far, and steps whose stamps are clear
     segment: NDArray[np.int64]  # (bins,) last segment of each bin, by the order of allocation in the batch
 
 
 @kernel
-def _new_scratch(bins: int, counting: bool) -> Any:
-    steps = bins if counting else 0
-    stamp = np.zeros((steps, bins), np.int64)
+def _new_scratch(bins: int) -> Any:
     i64 = np.int64
-    return BinScratch(np.empty(RING, i64), np.zeros(bins, i64), stamp, np.zeros(2, i64), np.zeros(bins, i64))
+    stamp = np.empty((bins, bins), i64)  # most of it is never touched
+    return BinScratch(np.empty(RING, i64), np.zeros(bins, i64), stamp, np.zeros(3, i64), np.zeros(bins, i64))
+
+
+@kernel(lent=True)
+def _ready_stamps(scratch: BinScratch, steps: int) -> None:
+    """Clear the stamps of steps that no warp before has had; begin the next warp."""
+    for step in range(scratch.warps[2], steps):
+        for b in range(scratch.stamp.shape[1]):
+            scratch.stamp[step, b] = 0
+    scratch.warps[2] = max(scratch.warps[2], steps)
+    scratch.warps[0] += 1
 
 
 @kernel(lent=True)
@@ -88,15 +97,19 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
     """
     last = min(first + BLOCK, end)
     go_on, start = last, write
-    visible, most = 0, 0
+    visible, most, visible_warps, multi_warps = 0, 0, 0, 0
     for triangle in range(first, last):  # several at once
         n = given.subtriangles[np.uint64(triangle)]
         visible, most = visible + (n > 0), max(most, n)
     if most <= 1 and write + visible - read < RING:
-        for triangle in range(first, last):  # without a branch: what is culled is overwritten by the next
-            ring[np.uint64(write & (RING - 1))] = triangle * 8 + SINGLE_TRIANGLE
-            write += given.subtriangles[np.uint64(triangle)]
+        for warp in range(first, last, WARP):
+            before = write
+            for triangle in range(warp, min(warp + WARP, last)):  # without a branch: the next overwrites what is culled
+                ring[np.uint64(write & (RING - 1))] = triangle * 8 + SINGLE_TRIANGLE
+                write += given.subtriangles[np.uint64(triangle)]
+            visible_warps += write > before
     else:
+        visible_warps, multi_warps = visible_of(given.subtriangles[first:last])
         for triangle in range(first, last):
             n = int(given.subtriangles[triangle])
             if write + n - read > RING:
@@ -113,18 +126,19 @@ def _read_step(given: BinInput, ring: Any, read: int, write: int, first: int, en
         events[BinRasterEvent.VISIBLE_LANES] += visible
         events[BinRasterEvent.ENTRIES] += write - start
         events[BinRasterEvent.OVERFLOWS] += go_on < last
-        for start in range(first, last, WARP):  # a byte a lane
-            segments = ((min(start + WARP, last) - 1) >> given.segment_log2) - (start >> given.segment_log2) + 1
-            count_load(events, 1, segments, segments * given.segment_bytes)
-            count_visible(given.subtriangles[start : min(start + WARP, last)], events)
+        events[BinRasterEvent.VISIBLE_WARPS] += visible_warps
+        events[BinRasterEvent.MULTI_WARPS] += multi_warps
+        segments = 0
+        for warp in range(first, last, WARP):  # a byte a lane
+            segments += ((min(warp + WARP, last) - 1) >> given.segment_log2) - (warp >> given.segment_log2) + 1
+        count_load(events, warps, segments, segments * given.segment_bytes)
     return go_on, write
 
 
 @kernel(lent=True)
-def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int]:
-    """Boxes of a warp's triangles; returns the path that follows from them, bins of the largest box, and of all."""
-    for lane in range(lanes):
-        boxes.slot[lane] = entry_slot(ring[(first + lane) % RING], given.misc)
+def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBoxes) -> tuple[int, int, int, bool]:
+    """Boxes of a warp's triangles; returns its path, bins of the largest, of all, and what find_slots returns."""
+    indirect = find_slots(ring[first % RING : first % RING + lanes], given.misc, boxes)  # rounds do not wrap around
     largest, area, side = warp_boxes(
         boxes,
         lanes,
@@ -136,10 +150,42 @@ def _load_warp(given: BinInput, ring: Any, first: int, lanes: int, boxes: WarpBo
         given.bins_y - 1,
     )
     if side <= 2:
-        return (FAST if largest > 1 else SINGLE), largest, area
+        return (FAST if largest > 1 else SINGLE), largest, area, indirect
     for lane in range(lanes):
         lane_edges(boxes, lane, given.half_x, given.half_y, BIN_SIDE_LOG2)
-    return SLOW, largest, area
+    return SLOW, largest, area, indirect
+
+
+@kernel(lent=True)
+def _emit_single(
+    given: BinInput, boxes: WarpBoxes, lanes: int, scratch: BinScratch, counts: Any, pairs: Any, used: int, events: Any
+) -> int:
+    """``_emit_warp`` of triangles in a bin each, a run of lanes with the same bin at a time; count the bins, too."""
+    lane, stores, distinct, number = 0, 0, 0, scratch.warps[0]
+    while lane < lanes:
+        b, start = np.uint64(boxes.box[X + lane] + boxes.box[Y + lane] * given.bins_x), lane
+        while lane < lanes and np.uint64(boxes.box[X + lane] + boxes.box[Y + lane] * given.bins_x) == b:
+            at = np.uint64(used + lane)
+            pairs[at, 0], pairs[at, 1] = b, boxes.entry[lane]
+            lane += 1
+        if events is not None:
+            first = (number << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
+            last = (number << 32) | ((counts[b] + lane - start - 1) * ENTRY_BYTES >> given.segment_log2)
+            stores += last - first + (scratch.stamp[0, b] != first)
+            distinct += scratch.stamp[0, b] >> 32 != number
+            scratch.stamp[0, b] = last
+        counts[b] += lane - start
+    if events is not None:
+        events[BinRasterEvent.SINGLE_LOOPS] += distinct
+        _count_emits(given, lanes, stores, events)
+    return used + lanes
+
+
+@kernel(lent=True)
+def _count_emits(given: BinInput, emits: int, stores: int, events: Any) -> None:
+    events[BinRasterEvent.EMITS] += emits
+    events[BinRasterEvent.STORE_TRANSACTIONS] += stores
+    events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
 
 
 @kernel(lent=True)
@@ -149,80 +195,58 @@ def _emit_warp(
     boxes: WarpBoxes,
     lanes: int,
     scratch: BinScratch,
-    first: int,
     counts: Any,
     pairs: Any,
     used: int,
     events: Any,
 ) -> int:
-    """List a warp's triangles with the bins that they touch; count the segments of memory that this writes.
+    """List a warp's triangles with the bins that they touch; count the segments that this writes, and note its votes.
 
     Returns the pairs in use.
     """
-    start, stores = used, 0
+    start, stores, number = used, 0, scratch.warps[0]
     for lane in range(lanes):
         x, y = np.int64(boxes.box[X + lane]), np.int64(boxes.box[Y + lane])
-        step = 0
+        step, columns = 0, np.int64(boxes.box[COLUMNS + lane])
+        width = columns if path == SLOW else 2
         for row in range(np.int64(boxes.box[ROWS + lane])):
-            for column in range(np.int64(boxes.box[COLUMNS + lane])):
+            for column in range(columns):
                 if path != SLOW or touches(boxes, lane, column, row):
                     b = x + column + (y + row) * given.bins_x
-                    pairs[used, 0], pairs[used, 1] = b, scratch.ring[(first + lane) % RING]
+                    pairs[used, 0], pairs[used, 1] = b, boxes.entry[lane]
                     if events is not None:
-                        mark = (scratch.warps[0] << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
+                        mark = (number << 32) | (counts[b] * ENTRY_BYTES >> given.segment_log2)
                         stores += scratch.stamp[step, b] != mark
                         scratch.stamp[step, b] = mark
+                        boxes.vote[(row * width + column) * WARP + (b & (WARP - 1))] += 1
                     counts[b] += 1
                     used += 1
                 step += 1
     if events is not None:
-        events[BinRasterEvent.EMITS] += used - start
-        events[BinRasterEvent.STORE_TRANSACTIONS] += stores
-        events[BinRasterEvent.STORE_BYTES] += stores * given.segment_bytes
+        _count_emits(given, used - start, stores, events)
     return used
 
 
 @kernel(lent=True)
-def _distinct_bins(boxes: WarpBoxes, lanes: int) -> int:
-    """Distinct bins of a warp whose boxes are one bin each."""
-    distinct = 0
-    for lane in range(lanes):
-        new = True
-        for other in range(lane - 1, -1, -1):
-            if boxes.box[X + other] == boxes.box[X + lane] and boxes.box[Y + other] == boxes.box[Y + lane]:
-                new = False
-                break
-        distinct += new
-    return distinct
-
-
-@kernel(lent=True)
 def _count_warp(
-    given: BinInput, path: int, largest: int, area: int, boxes: WarpBoxes, lanes: int, scratch: BinScratch, first: int,
-    events: Any,
-) -> None:  # fmt: skip
-    """Count what a warp's loads, its path and the walk to its queues cost."""
-    indirect = False
-    for lane in range(lanes):
-        indirect |= scratch.ring[(first + lane) % RING] & 7 != SINGLE_TRIANGLE
+    given: BinInput, path: int, largest: int, area: int, indirect: bool, boxes: WarpBoxes, lanes: int, events: Any
+) -> None:
+    """Count what a warp's loads, its path and the walk to its queues cost; its votes are in."""
+    ors, replays = (0, 0) if path == SINGLE else count_votes(boxes, largest if path == SLOW else 4)
     events[BinRasterEvent.BOX_BINS] += area
     events[BinRasterEvent.INDIRECT_WARPS] += indirect
     if path == SINGLE:
         events[BinRasterEvent.SINGLE_WARPS] += 1
         events[BinRasterEvent.SINGLE_LANES] += lanes
-        events[BinRasterEvent.SINGLE_LOOPS] += _distinct_bins(boxes, lanes)
-        ors, replays = 0, 0
     elif path == FAST:
         events[BinRasterEvent.FAST_WARPS] += 1
         events[BinRasterEvent.FAST_LANES] += lanes
-        ors, replays = small_votes(boxes, lanes, given.bins_x)
     else:
         events[BinRasterEvent.SLOW_WARPS] += 1
         events[BinRasterEvent.SLOW_LANES] += lanes
         events[BinRasterEvent.SLOW_STEPS] += largest
         events[BinRasterEvent.SLOW_LANE_STEPS] += area
-        ors, replays, ends = walk_votes(boxes, lanes, largest, given.bins_x)
-        events[BinRasterEvent.ROW_ENDS] += ends
+        events[BinRasterEvent.ROW_ENDS] += row_ends(boxes, lanes, largest)
     events[BinRasterEvent.WALK_STEPS] += largest
     events[BinRasterEvent.ENQUEUE_STEPS] += ors if path == SLOW else largest
     events[BinRasterEvent.SHARED_ATOMIC] += ors
@@ -238,7 +262,7 @@ def play_batch(given: BinInput, b: int, batch: int, counts: Any, events: Any) ->
     """
     pairs, used = np.empty((batch, 2), np.int32), np.int64(0)
     first, end = b * batch, min((b + 1) * batch, given.subtriangles.size)
-    scratch, boxes = _new_scratch(counts.size, events is not None), new_boxes()
+    scratch, boxes = _new_scratch(counts.size), new_boxes()
     read = write = np.int64(0)  # literals that change in a loop have their callees compiled twice
     while True:
         while write - read < BLOCK and first < end:
@@ -247,14 +271,18 @@ def play_batch(given: BinInput, b: int, batch: int, counts: Any, events: Any) ->
         longest, steps, paths = 0, 0, 0
         for start in range(read, read + m, WARP):
             lanes = min(WARP, read + m - start)
-            path, largest, area = _load_warp(given, scratch.ring, start, lanes, boxes)
+            path, largest, area, indirect = _load_warp(given, scratch.ring, start, lanes, boxes)
+            _ready_stamps(scratch, largest)
+            if used + area > len(pairs):
+                pairs = with_room(pairs, used, area)
+            if path == SINGLE:
+                used = _emit_single(given, boxes, lanes, scratch, counts, pairs, used, events)
+            else:
+                used = _emit_warp(given, path, boxes, lanes, scratch, counts, pairs, used, events)
             if events is not None:
-                scratch.warps[0] += 1
                 longest, paths = max(longest, largest), paths | (1 << path)
                 steps = max(steps, largest if path == SLOW else 0)
-                _count_warp(given, path, largest, area, boxes, lanes, scratch, start, events)
-            pairs = room_for(pairs, used, area)
-            used = _emit_warp(given, path, boxes, lanes, scratch, start, counts, pairs, used, events)
+                _count_warp(given, path, largest, area, indirect, boxes, lanes, events)
         if events is not None:
             events[BinRasterEvent.ROUNDS] += 1
             events[BinRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP

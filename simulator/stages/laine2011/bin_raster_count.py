@@ -30,13 +30,15 @@ def count_atomic(events: Any, executed: int) -> None:
 
 
 @kernel(lent=True)
-def count_visible(subtriangles: Any, events: Any) -> None:
-    """Count the warp of a read if any of its triangles is visible, and if any has several sub-triangles."""
-    most = 0
-    for n in subtriangles:
-        most = max(most, int(n))
-    events[BinRasterEvent.VISIBLE_WARPS] += most > 0
-    events[BinRasterEvent.MULTI_WARPS] += most > 1
+def visible_of(subtriangles: Any) -> tuple[int, int]:
+    """Warps of a read with a visible triangle, and with one that has several sub-triangles."""
+    visible, several = 0, 0
+    for first in range(0, subtriangles.size, WARP):
+        most = 0
+        for n in subtriangles[first : first + WARP]:
+            most = max(most, int(n))
+        visible, several = visible + (most > 0), several + (most > 1)
+    return visible, several
 
 
 @kernel(lent=True)

@@ -15,6 +15,7 @@ from tilestamp.models.errors import TilestampError
 from tilestamp.models.kernel import kernel
 from tilestamp.models.simt import Simt
 
+MAX_SQUARES = 256  # that a walk can visit: the bins of a frame, or the tiles of a bin
 WARP = 32  # lanes; the original's ballots and its masks of 32 bits know no other width
 HEADER_BYTES = 16  # six int16 coordinates and one word
 BIN_SIDE_LOG2 = 11  # a bin is 128 pixels of 16 sub-pixels wide
@@ -29,12 +30,15 @@ X, Y, COLUMNS, ROWS = 0, 32, 64, 96  # where those of the lanes begin in ``WarpB
 class WarpBoxes(NamedTuple):
     """The triangles of one warp: scratch space of a worker."""
 
+    entry: NDArray[np.int64]  # (32,) as they are queued
     slot: NDArray[np.int64]  # (32,) index of header and data
     corner: NDArray[np.int32]  # (6 * 32,) x0, y0, x1, y1, x2, y2 of the lanes, side by side
     box: NDArray[np.int32]  # (4 * 32,) first column, first row, columns, rows of squares, too
     edge: NDArray[np.int64]  # (32, 3) edge functions at the walk's square, largest over that closed square
     step: NDArray[np.int64]  # (32, 6) dx0 dy0 dx1 dy1 dx2 dy2 times the square's side
-    bank: NDArray[np.int64]  # (32,) lanes on each shared memory bank, or addresses, of the current instruction
+    address: NDArray[np.int64]  # (32,) of the lanes, of one instruction
+    vote: NDArray[np.uint8]  # (256 * 32,) lanes on each shared memory bank, at each step of a walk
+    corners: NDArray[np.int32]  # (32,) boxes at most 2 x 2 by the bank they begin on: all, the wide, the high, both
 
 
 @kernel
@@ -42,11 +46,14 @@ def new_boxes() -> Any:
     """Make room for the triangles of one warp."""
     return WarpBoxes(
         np.zeros(WARP, np.int64),
+        np.zeros(WARP, np.int64),
         np.zeros(6 * WARP, np.int32),
         np.zeros(4 * WARP, np.int32),
         np.zeros((WARP, 3), np.int64),
         np.zeros((WARP, 6), np.int64),
         np.zeros(WARP, np.int64),
+        np.zeros(MAX_SQUARES * WARP, np.uint8),
+        np.zeros(WARP, np.int32),
     )
 
 
@@ -59,13 +66,27 @@ def entry_slot(entry: Any, misc: Any) -> Any:
     return np.int64(misc[entry >> 3]) + part
 
 
+@kernel(lent=True)
+def find_slots(entries: Any, misc: Any, boxes: WarpBoxes) -> bool:
+    """Take a warp's queue entries and find their slots; returns whether any of them is not its triangle's own."""
+    indirect = False
+    for lane in range(entries.size):
+        entry = np.int64(entries[lane])
+        boxes.entry[lane], boxes.slot[lane] = entry, entry >> 3
+        indirect |= entry & 7 != SINGLE_TRIANGLE
+    if indirect:
+        for lane in range(entries.size):
+            boxes.slot[lane] = entry_slot(boxes.entry[lane], misc)
+    return indirect
+
+
 @kernel(lent=True, inline=True)
 def _squares(a: Any, b: Any, c: Any, move: int, shift: int, last: int) -> Any:
     """First square, and how many, between three places on an axis."""
-    low: Any = np.int32(min(a, b, c) + move) >> shift
-    high: Any = np.int32(max(a, b, c) + move) >> shift
-    first: Any = min(max(low, 0), last)
-    return first, min(max(high, 0), last) - first + 1
+    low: Any = np.int32(np.int32(min(a, b, c) + move) >> shift)
+    high: Any = np.int32(np.int32(max(a, b, c) + move) >> shift)
+    first: Any = min(max(low, np.int32(0)), np.int32(last))
+    return first, np.int32(min(max(high, np.int32(0)), np.int32(last)) - first + 1)
 
 
 @kernel(lent=True)
@@ -88,14 +109,18 @@ def warp_boxes(
         header = headers[np.uint64(boxes.slot[lane])]
         for k in range(6):
             corner[np.uint64(k * WARP + lane)] = header[k]
-    largest, area, side = 1, 0, 1
+    largest: Any = np.int32(1)
+    area: Any = np.int32(0)
+    side: Any = np.int32(1)
     for lane in range(lanes):
         i = np.uint64(lane)
         x, columns = _squares(corner[i], corner[i + _64], corner[i + _128], move_x, shift, last_x)
         y, rows = _squares(corner[i + _32], corner[i + _96], corner[i + _160], move_y, shift, last_y)
         box[i], box[i + _32], box[i + _64], box[i + _96] = x, y, columns, rows
-        largest, area, side = max(largest, columns * rows), area + columns * rows, max(side, columns, rows)
-    return largest, area, side
+        squares = np.int32(columns * rows)
+        largest, area = max(largest, squares), np.int32(area + squares)
+        side = max(side, np.int32(columns), np.int32(rows))
+    return int(largest), int(area), int(side)
 
 
 @kernel(lent=True)
@@ -121,57 +146,51 @@ def touches(boxes: WarpBoxes, lane: int, column: int, row: int) -> bool:
 
 
 @kernel(lent=True)
-def _count_corner(boxes: WarpBoxes, lanes: int, stride: int, wide: bool, high: bool) -> int:
-    """Replays of the OR at one corner of all boxes (``wide``/``high``: of those two squares wide/high); -1: no lane."""
-    boxes.bank[:] = 0
-    deepest = 0
-    for lane in range(lanes):
-        if boxes.box[COLUMNS + lane] > wide and boxes.box[ROWS + lane] > high:
-            bank = (boxes.box[X + lane] + wide + (boxes.box[Y + lane] + high) * stride) & (WARP - 1)
-            boxes.bank[bank] += 1
-            deepest = max(deepest, boxes.bank[bank])
-    return deepest - 1
-
-
-@kernel(lent=True)
-def small_votes(boxes: WarpBoxes, lanes: int, stride: int) -> tuple[int, int]:
-    """Shared ORs of a warp whose boxes are at most 2 x 2, and their replays: one for each corner that any lane has."""
+def count_votes(boxes: WarpBoxes, steps: int) -> tuple[int, int]:
+    """Shared ORs of a warp, one for each of its steps that has a vote, and their replays; the votes are forgotten."""
     ors, replays = 0, 0
-    for corner in range(4):
-        deep = _count_corner(boxes, lanes, stride, corner & 1, corner >> 1)
-        if deep >= 0:
-            ors, replays = ors + 1, replays + deep
+    for step in range(steps):
+        votes = boxes.vote[step * WARP : (step + 1) * WARP]
+        deepest: Any = np.uint8(0)
+        for bank in range(WARP):  # all at once
+            deepest = max(deepest, votes[bank])
+        ors, replays = ors + (deepest > 0), replays + max(int(deepest) - 1, 0)
+        for bank in range(WARP):
+            votes[bank] = 0
     return ors, replays
 
 
 @kernel(lent=True)
-def walk_votes(boxes: WarpBoxes, lanes: int, steps: int, stride: int) -> tuple[int, int, int]:
-    """Shared ORs of a warp whose lanes walk their boxes with the edge test, their replays, and steps that end a row."""
-    ors, replays, ends = 0, 0, 0
+def count_corners(corners: Any) -> tuple[int, int]:
+    """As ``count_votes``, of boxes that are at most 2 x 2: a step for each corner, a byte of each bank's number."""
+    ors, replays = 0, 0
+    for corner in range(4):
+        shift = np.int32(8 * corner)
+        deepest: Any = np.int32(0)
+        for bank in range(WARP):
+            deepest = max(deepest, np.int32(corners[bank] >> shift & np.int32(255)))
+        ors, replays = ors + (deepest > 0), replays + max(int(deepest) - 1, 0)
+    for bank in range(WARP):
+        corners[bank] = 0
+    return ors, replays
+
+
+@kernel(lent=True)
+def row_ends(boxes: WarpBoxes, lanes: int, steps: int) -> int:
+    """Steps at which a lane of a warp that walks its boxes ends a row."""
+    ends = 0
     for step in range(steps):
-        boxes.bank[:] = 0
-        deepest = 0
         end = False
         for lane in range(lanes):
             columns = np.int64(boxes.box[COLUMNS + lane])
-            if step < columns * boxes.box[ROWS + lane]:
-                column, row = step % columns, step // columns
-                end |= column == columns - 1
-                if touches(boxes, lane, column, row):
-                    bank = (boxes.box[X + lane] + column + (boxes.box[Y + lane] + row) * stride) & (WARP - 1)
-                    boxes.bank[bank] += 1
-                    deepest = max(deepest, boxes.bank[bank])
-        if deepest > 0:
-            ors, replays = ors + 1, replays + deepest - 1
+            end |= step < columns * boxes.box[ROWS + lane] and step % columns == columns - 1
         ends += end
-    return ors, replays, ends
+    return ends
 
 
 @kernel
-def room_for(pairs: Any, used: int, more: int) -> Any:
-    """Pairs of a square and an entry, (n, 2), as they are or in a larger array, with room for ``more`` behind."""
-    if used + more <= len(pairs):
-        return pairs
+def with_room(pairs: Any, used: int, more: int) -> Any:
+    """Pairs of a square and an entry, (n, 2), in a larger array, with room for ``more`` behind those in use."""
     larger = np.empty((2 * len(pairs) + more, 2), np.int32)
     for i in range(used):
         larger[i, 0], larger[i, 1] = pairs[i, 0], pairs[i, 1]
@@ -191,9 +210,9 @@ def place_pairs(pairs: Any, cursors: Any, entries: Any) -> None:
 def header_load(boxes: WarpBoxes, lanes: int, segment_bytes: int) -> tuple[int, int]:
     """Transactions and bytes of a warp's load of its triangles' headers, 16 bytes a lane."""
     for lane in range(lanes):
-        boxes.bank[lane] = boxes.slot[lane] * HEADER_BYTES
+        boxes.address[lane] = boxes.slot[lane] * HEADER_BYTES
     rule = WARP_SECTORS if segment_bytes == SECTOR_BYTES else WARP_LINES
-    count, size = transactions(boxes.bank, lanes, HEADER_BYTES, rule)
+    count, size = transactions(boxes.address, lanes, HEADER_BYTES, rule)
     return count, size
 
 

@@ -14,21 +14,20 @@ from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     COLUMNS,
     ROWS,
-    SINGLE_TRIANGLE,
     TILE_SIDE_LOG2,
     WARP,
     WarpBoxes,
     X,
     Y,
-    entry_slot,
+    count_corners,
+    count_votes,
+    find_slots,
     header_load,
     lane_edges,
     new_boxes,
-    room_for,
-    small_votes,
     touches,
-    walk_votes,
     warp_boxes,
+    with_room,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 
@@ -59,6 +58,16 @@ class CoarseInput(NamedTuple):
     segment_log2: int
 
 
+class WarpCase(NamedTuple):
+    """Which way a warp goes, and what decides it."""
+
+    case: int
+    indirect: bool  # whether an entry is not its triangle's own slot
+    largest: int  # tiles of the largest box
+    union: int  # tiles, and rows of tiles, of the box around all, but in case A
+    rows: int
+
+
 class Place(NamedTuple):
     """One bin in the frame."""
 
@@ -85,9 +94,8 @@ def _place(given: CoarseInput, b: int) -> Any:
 
 @kernel(lent=True)
 def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> Any:
-    """Boxes of a warp's triangles; returns its case, tiles of the largest, the union and all boxes, and its rows."""
-    for lane in range(lanes):
-        boxes.slot[lane] = entry_slot(np.int64(given.entries[first + lane]), given.misc)
+    """Boxes of a warp's triangles; returns what ``_count_warp`` takes, tiles of all boxes last."""
+    indirect = find_slots(given.entries[first : first + lanes], given.misc, boxes)
     largest, area, side = warp_boxes(
         boxes,
         lanes,
@@ -98,68 +106,82 @@ def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: 
         place.last_x,
         place.last_y,
     )
+    if side <= 2:
+        return WarpCase(CASE_A, indirect, largest, 0, 0), area
     low_x, low_y, high_x, high_y = BIN_TILES, BIN_TILES, 0, 0
     for lane in range(lanes):
         x, y = boxes.box[X + lane], boxes.box[Y + lane]
         low_x, low_y = min(low_x, x), min(low_y, y)
         high_x, high_y = max(high_x, x + boxes.box[COLUMNS + lane]), max(high_y, y + boxes.box[ROWS + lane])
     union, rows = (high_x - low_x) * (high_y - low_y), high_y - low_y
-    if side <= 2:
-        return CASE_A, largest, union, area, rows
     for lane in range(lanes):
         lane_edges(boxes, lane, place.move_x, place.move_y, TILE_SIDE_LOG2)
-    return (CASE_B if union * 4 <= largest * 8 else CASE_C), largest, union, area, rows
+    return WarpCase(CASE_B if union * 4 <= largest * 8 else CASE_C, indirect, largest, union, rows), area
+
+
+@kernel(lent=True, inline=True)
+def _emit(tile: Any, slot: Any, touched: Any, counts: Any, pairs: Any, used: Any) -> Any:
+    """List a tile that is touched; what is listed of another is overwritten by the next."""
+    pairs[used, 0], pairs[used, 1] = tile, slot
+    counts[tile] += touched
+    return used + np.uint64(touched)
 
 
 @kernel(lent=True)
-def _emit_warp(case: int, boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int) -> int:
-    """List a warp's triangles with the tiles that they touch; returns the pairs in use."""
+def _emit_small(boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int, events: Any) -> Any:
+    """``_emit_warp`` of boxes that are at most 2 x 2: all of them is touched. No branch: sizes cannot be foretold."""
+    box, end, last = boxes.box, np.uint64(used), np.uint64(TILES - 1)
+    for lane in range(lanes):
+        tile, slot = np.uint64(box[X + lane] + box[Y + lane] * BIN_TILES), boxes.slot[lane]
+        wide, high = box[COLUMNS + lane] > 1, box[ROWS + lane] > 1
+        end = _emit(tile, slot, True, counts, pairs, end)
+        end = _emit((tile + np.uint64(1)) & last, slot, wide, counts, pairs, end)
+        end = _emit((tile + np.uint64(BIN_TILES)) & last, slot, high, counts, pairs, end)
+        end = _emit((tile + np.uint64(BIN_TILES + 1)) & last, slot, wide & high, counts, pairs, end)
+        if events is not None:
+            boxes.corners[tile & np.uint64(WARP - 1)] += 1 | wide << 8 | high << 16 | (wide & high) << 24
+    return np.int64(end)
+
+
+@kernel(lent=True)
+def _emit_warp(boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int, events: Any) -> int:
+    """List a warp's triangles with the tiles that they touch, and note its votes; returns the pairs in use."""
     for lane in range(lanes):
         x, y = np.int64(boxes.box[X + lane]), np.int64(boxes.box[Y + lane])
+        columns = np.int64(boxes.box[COLUMNS + lane])
         for row in range(np.int64(boxes.box[ROWS + lane])):
-            for column in range(np.int64(boxes.box[COLUMNS + lane])):
-                if case == CASE_A or touches(boxes, lane, column, row):
+            for column in range(columns):
+                if touches(boxes, lane, column, row):
                     tile = x + column + (y + row) * BIN_TILES
                     pairs[used, 0], pairs[used, 1] = tile, boxes.slot[lane]
                     used += 1
                     counts[tile] += 1
+                    if events is not None:
+                        boxes.vote[(row * columns + column) * WARP + (tile & (WARP - 1))] += 1
     return used
 
 
 @kernel(lent=True)
 def _count_warp(
-    given: CoarseInput,
-    case: int,
-    largest: int,
-    union: int,
-    area: int,
-    rows: int,
-    boxes: WarpBoxes,
-    lanes: int,
-    first: int,
-    events: Any,
-) -> None:
-    """Count what a warp's loads and its case cost."""
-    indirect = False
-    for lane in range(lanes):
-        indirect |= given.entries[first + lane] & 7 != SINGLE_TRIANGLE
+    given: CoarseInput, way: WarpCase, area: int, boxes: WarpBoxes, lanes: int, events: Any
+) -> None:  # fmt: skip
+    """Count what a warp's loads and its case cost; its votes are in."""
     events[CoarseRasterEvent.BOX_TILES] += area
-    events[CoarseRasterEvent.INDIRECT_WARPS] += indirect
-    ors, replays = 0, 0
-    if case == CASE_A:
+    events[CoarseRasterEvent.INDIRECT_WARPS] += way.indirect
+    ors, replays = count_corners(boxes.corners) if way.case == CASE_A else count_votes(boxes, way.largest)
+    if way.case == CASE_A:
         events[CoarseRasterEvent.CASE_A_WARPS] += 1
-        ors, replays = small_votes(boxes, lanes, BIN_TILES)
-    elif case == CASE_B:
+    elif way.case == CASE_B:
         events[CoarseRasterEvent.CASE_B_WARPS] += 1
-        events[CoarseRasterEvent.CASE_B_STEPS] += union
-        events[CoarseRasterEvent.CASE_B_ROWS] += rows
+        events[CoarseRasterEvent.CASE_B_STEPS] += way.union
+        events[CoarseRasterEvent.CASE_B_ROWS] += way.rows
         events[CoarseRasterEvent.CASE_B_LANE_STEPS] += area
-        events[CoarseRasterEvent.CASE_B_LANE_ROWS] += rows * lanes
+        events[CoarseRasterEvent.CASE_B_LANE_ROWS] += way.rows * lanes
+        ors, replays = 0, 0  # lanes hand their tiles on without an atomic
     else:
         events[CoarseRasterEvent.CASE_C_WARPS] += 1
-        events[CoarseRasterEvent.CASE_C_STEPS] += largest
+        events[CoarseRasterEvent.CASE_C_STEPS] += way.largest
         events[CoarseRasterEvent.CASE_C_LANE_STEPS] += area
-        ors, replays, _ = walk_votes(boxes, lanes, largest, BIN_TILES)
     events[CoarseRasterEvent.SHARED_ATOMIC] += ors
     events[CoarseRasterEvent.BANK_REPLAYS] += replays
     _count_load(events, 1, *header_load(boxes, lanes, given.segment_bytes))
@@ -185,28 +207,29 @@ def _count_atomic(events: Any, executed: int) -> None:
 def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, events: Any) -> None:
     """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
     fresh, touched, emits, stores = 0, 0, 0, 0
-    linked, opened, most = 0, 0, 0  # of the tiles of a warp
-    for tile in range(counts.size):
-        place, end = before[tile], counts[tile]
-        new = (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
-        linked, opened, most = linked + (new > 0), opened + (new > 0 and place == 0), max(most, end - place)
-        if tile % WARP == WARP - 1:
-            events[CoarseRasterEvent.LINK_WARPS] += linked > 0
-            events[CoarseRasterEvent.FIRST_WARPS] += opened > 0
-            events[CoarseRasterEvent.SCAN_WARPS] += most > 1
-            stores += linked - opened + ((opened * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)
-            linked, opened, most = 0, 0, 0
-        before[tile] = end
-        touched += end > place
-        fresh += new
-        if new > 0:
-            tails[TILES] += new
-            tails[tile] = tails[TILES]
-        while place < end:  # the part of a tile's emits that one warp writes
-            part = min(end - place, WARP - emits % WARP)
-            first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
-            stores += (last >> given.segment_log2) - (first >> given.segment_log2) + 1
-            place, emits = place + part, emits + part
+    for warp in range(0, counts.size, WARP):
+        linked, opened, most = 0, 0, 0
+        for tile in range(warp, warp + WARP):
+            place, end = before[tile], counts[tile]
+            if place == end:
+                continue
+            new = (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
+            linked, opened, most = linked + (new > 0), opened + (new > 0 and place == 0), max(most, end - place)
+            before[tile] = end
+            touched += 1
+            fresh += new
+            if new > 0:
+                tails[TILES] += new
+                tails[tile] = tails[TILES]
+            while place < end:  # the part of a tile's emits that one warp writes
+                part = min(end - place, WARP - emits % WARP)
+                first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
+                stores += (last >> given.segment_log2) - (first >> given.segment_log2) + 1
+                place, emits = place + part, emits + part
+        events[CoarseRasterEvent.LINK_WARPS] += linked > 0
+        events[CoarseRasterEvent.FIRST_WARPS] += opened > 0
+        events[CoarseRasterEvent.SCAN_WARPS] += most > 1
+        stores += linked - opened + ((opened * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)
     events[CoarseRasterEvent.TILES_TOUCHED] += touched
     events[CoarseRasterEvent.EMITS] += emits
     events[CoarseRasterEvent.EMIT_STEPS] += (emits + BLOCK - 1) // BLOCK
@@ -283,14 +306,18 @@ def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
         longest_b, longest_c, cases = 0, 0, 0
         for first in range(read, read + m, WARP):
             lanes = min(WARP, read + m - first)
-            case, largest, union, area, rows = _load_warp(given, place, first, lanes, boxes)
+            way, area = _load_warp(given, place, first, lanes, boxes)
+            if used + area >= len(pairs):
+                pairs = with_room(pairs, used, area + 1)
+            if way.case == CASE_A:
+                used = _emit_small(boxes, lanes, counts, pairs, used, events)
+            else:
+                used = _emit_warp(boxes, lanes, counts, pairs, used, events)
             if events is not None:
-                longest_b = max(longest_b, union if case == CASE_B else 0)
-                longest_c = max(longest_c, largest if case == CASE_C else 0)
-                cases |= 1 if case == CASE_A else 2
-                _count_warp(given, case, largest, union, area, rows, boxes, lanes, first, events)
-            pairs = room_for(pairs, used, area)
-            used = _emit_warp(case, boxes, lanes, counts, pairs, used)
+                longest_b = max(longest_b, way.union if way.case == CASE_B else 0)
+                longest_c = max(longest_c, way.largest if way.case == CASE_C else 0)
+                cases |= 1 if way.case == CASE_A else 2
+                _count_warp(given, way, area, boxes, lanes, events)
         if events is not None:
             events[CoarseRasterEvent.ROUNDS] += 1
             events[CoarseRasterEvent.LONGEST_B] += longest_b

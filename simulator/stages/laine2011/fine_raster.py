@@ -68,9 +68,12 @@ def _draw_part(
     """Draw a share of the active tiles, through arrays without reference counts."""
     first, last = active.size * part // parts, active.size * (part + 1) // parts
     tile = new_tile(1 << draw.log_samples)
+    every = np.zeros(0 if table is None else table.shape[1], np.int64)
+    if table is not None:
+        count_tile(draw, every)
     lists = borrow(starts), borrow(entries)
     lent = borrow(tile), borrow(setup), borrow(colors), borrow(buffers)
-    _draw_tiles(first, last, active, lists, *lent, draw, behind, several, borrow(table))
+    _draw_tiles(first, last, active, lists, *lent, draw, behind, several, borrow(table), borrow(every))
     tile.state[0] = 0  # the owner lives to here
 
 
@@ -88,6 +91,7 @@ def _draw_tiles(
     behind: Any,
     several: Any,
     table: Any,
+    every: Any,
 ) -> None:
     starts, entries = lists
     for a in range(first, last):
@@ -99,9 +103,10 @@ def _draw_tiles(
             load_layer(behind, tile, x, y)
         start_tile(tile, starts[t], starts[t + 1])
         row = row_of(table, a)
-        draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
         if table is not None:
-            count_tile(draw, row)
+            for event in range(every.size):  # what every tile counts; until now the row is as memory was
+                row[event] = every[event]
+        draw_tile(setup, entries, colors, draw, tile, left, bottom, several, row)
         store_tile(buffers, setup, colors, draw, tile, x, y)
 
 
@@ -231,7 +236,7 @@ def draw_rows(
 ) -> NDArray[np.int64] | None:
     """Draw into the buffers; a row of events an active tile."""
     starts, entries, active = lists
-    rows = np.zeros((len(active), len(FineRasterEvent)), np.int64) if counting else None
+    rows = np.empty((len(active), len(FineRasterEvent)), np.int64) if counting else None
     several = True if draw.log_samples else None
     with np.errstate(all="ignore"):
         parts = parts_of(len(active), _PART_TILES)

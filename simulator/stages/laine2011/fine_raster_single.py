@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tilestamp.models.bits import lowest_bit, lowest_bits, popcount
-from tilestamp.models.coalescing import transactions, transactions_of_runs
+from tilestamp.models.coalescing import SECTOR_BYTES, WARP_SECTORS, transactions, transactions_of_runs
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import (
     END,
@@ -43,8 +43,12 @@ def count_reads(setup: Setup, draw: Draw, slots: Any, addresses: Any, n: int, pa
 
 
 @kernel(lent=True)
-def draw_nearer(draw: Draw, tile: Tile, plane: Any, record: int, mask: Any, column: int, line: int, row: Any) -> Any:
+def draw_nearer(
+    draw: Draw, tile: Tile, plane: Any, record: int, mask: Any, column: int, line: int, row: Any, hit: Any
+) -> Any:
     """Depth test and write of fragments of one triangle, after all before them.
+
+    ``hit`` has the pixels that the round has written, or more: those alone have another depth than before it.
 
     Returns
     -------
@@ -59,7 +63,7 @@ def draw_nearer(draw: Draw, tile: Tile, plane: Any, record: int, mask: Any, colu
         shift, first = np.uint64(at), corner + zy * (at >> 3)
         bits = (mask >> shift) & _ROW
         mask &= ~(_ROW << shift)
-        if row is not None:
+        if row is not None and (draw.peel or bits & (hit >> shift) != np.uint64(0)):
             passed |= (bits & below(first, -zx, tile.before, at, draw.later_wins)) << shift
         bits &= below(first, -zx, tile.depth, at, draw.later_wins)
         if draw.peel:
@@ -69,7 +73,7 @@ def draw_nearer(draw: Draw, tile: Tile, plane: Any, record: int, mask: Any, colu
         write(record, 0, tile.owner, at, bits)
         written |= bits << shift
     tile.state[UPDATE] |= covered != np.uint64(0)
-    return passed, written
+    return passed | written, written
 
 
 @kernel(lent=True)
@@ -115,6 +119,7 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
     """
     state, n, kept, writes, longest = tile.state, 0, 0, 0, 0
     starts, kept_starts, record_bytes = np.uint64(0), np.uint64(0), setup.planes.shape[1] * _WORD_BYTES
+    hit = np.uint64(0)
     head, tail = state[HEAD], state[TAIL]
     queued = min(tail - head, WARP)
     if row is not None and draw.depth:
@@ -129,7 +134,7 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
             if draw.shade_late:
                 for i in range(13, 16):
                     prefetch(colors, np.int64(setup.planes[record, i]))
-            passed, written = draw_nearer(draw, tile, setup.planes[record], record, mask, column, line, row)
+            passed, written = draw_nearer(draw, tile, setup.planes[record], record, mask, column, line, row, hit)
         else:
             _draw_over(setup, colors, draw, tile, record, mask, column, line)
         if row is not None:
@@ -140,23 +145,32 @@ def _draw_round(setup: Setup, colors: Any, draw: Draw, tile: Tile, column: int, 
                 tile.pixel[kept] = slot * record_bytes
                 kept += popcount(passed)
             writes += popcount(written)
-            longest = add_hits(tile.more, longest, passed if draw.later_wins else written)
+            hits = passed if draw.later_wins else written
+            again, hit = hit & hits, hit | hits
+            if again != np.uint64(0):
+                longest = add_hits(tile.more, longest, again)
         n += popcount(mask)
     state[FRAGMENTS] -= n
     state[HEAD] = head
     if row is not None:
         if draw.depth:
-            _count_reads(draw, tile.slot, starts, n, 1, row)
+            _count_reads(draw, tile.slot, starts, n, record_bytes, 1, row)
         row[FineRasterEvent.TAG_LANES] += queued
-        _count_round(draw, n, kept, writes, longest, row)
+        _count_round(draw, n, kept, writes, longest + (hit != np.uint64(0)), row)
         if kept > 0 and not draw.later_wins:
-            _count_reads(draw, tile.pixel, kept_starts, kept, 3 if draw.interpolate else 1, row)
+            _count_reads(draw, tile.pixel, kept_starts, kept, record_bytes, 3 if draw.interpolate else 1, row)
 
 
 @kernel(lent=True)
-def _count_reads(draw: Draw, addresses: Any, starts: Any, lanes: int, parts: int, row: Any) -> None:
+def _count_reads(
+    draw: Draw, addresses: Any, starts: Any, lanes: int, record_bytes: int, parts: int, row: Any
+) -> None:  # fmt: skip
     """Count reads of ``parts`` parts of 16 bytes of records, at an address for each run of lanes."""
-    count, size = transactions_of_runs(addresses, starts, lanes, 16, draw.coalescing)
+    if draw.coalescing == WARP_SECTORS and record_bytes >= SECTOR_BYTES:  # no two triangles share a sector
+        count = popcount(starts)
+        size = count * SECTOR_BYTES
+    else:
+        count, size = transactions_of_runs(addresses, starts, lanes, 16, draw.coalescing)
     row[FineRasterEvent.LOAD_TRANSACTIONS] += parts * count
     row[FineRasterEvent.LOAD_BYTES] += parts * size
 

@@ -9,7 +9,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.stages.laine2011.fine_raster_queue import HEADER_BYTES, PIXELS, SEGMENT, TILE, FineRasterEvent
 from tilestamp.simulator.stages.laine2011.triangle_setup import Release
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup
-from tilestamp.simulator.work import Work
+from tilestamp.simulator.work import Work, column_sums
 
 WARPS = 20  # a block
 TABLE_BYTES = 6144  # edge coverage, shared
@@ -41,7 +41,8 @@ def fine_work(
     warps = min(WARPS, (SHARED_BYTES - TABLE_BYTES) // each)
     _add_starts(rows, warps * simt.sms, smallest_transaction_bytes(int(simt.coalescing)))
     shared = TABLE_BYTES + warps * each + (2**samples if samples > 1 else 0)
-    queue = np.array([DRAW_REQUESTS[release] * rows[:, FineRasterEvent.ATOMIC].sum()])
+    totals = column_sums(rows)
+    queue = np.array([DRAW_REQUESTS[release] * totals[FineRasterEvent.ATOMIC]])
     return Work(
         stage="fine_raster",
         kernel="fineRaster",
@@ -51,7 +52,7 @@ def fine_work(
         block=32 * warps,
         shared_bytes=shared,
         dispatch="warp_queue",
-        streams=_streams(rows, setup, len(tile_entries), width, height, samples),
+        streams=_streams(totals, setup, len(tile_entries), width, height, samples),
         atomic_requests=queue,
         variant="" if release == "nvdiffrast" else mode if samples == 1 else f"{mode} msaa",
     )
@@ -71,7 +72,7 @@ def _add_starts(rows: NDArray[np.int64], warps: int, segment_bytes: int) -> None
 
 
 def _streams(
-    table: NDArray[np.int64], setup: Setup, entries: int, width: int, height: int, samples: int
+    totals: list[int], setup: Setup, entries: int, width: int, height: int, samples: int
 ) -> tuple[Stream, ...]:
     """Buffers that fine raster reads and writes; records are what is left of the loads after lists and headers.
 
@@ -80,7 +81,7 @@ def _streams(
     """
     E = FineRasterEvent
     segments, lanes, loads, loaded, stored = (
-        int(table[:, event].sum()) for event in (E.SEGMENTS, E.ENTRY_LANES, E.TILE_LOADS, E.LOAD_BYTES, E.STORE_BYTES)
+        totals[event] for event in (E.SEGMENTS, E.ENTRY_LANES, E.TILE_LOADS, E.LOAD_BYTES, E.STORE_BYTES)
     )
     lists, headers, tiles = segments * 4 * SEGMENT, lanes * HEADER_BYTES, loads * 2 * 4 * PIXELS * samples
     kept = int(setup.subtriangles.sum(dtype=np.int64))

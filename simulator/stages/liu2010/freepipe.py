@@ -40,7 +40,7 @@ from tilestamp.simulator.work import Work
 
 Packing = Literal["64", "32"]
 BLOCK = 256  # threads
-UNROLLED = 4  # pixels in a turn of the inner loop, as nvcc 13 compiles it for machines that load by sectors
+UNROLLED_LOG2 = 2  # of 4 pixels in a turn of the inner loop, as nvcc 13 compiles it for machines that load by sectors
 WORKERS = 4  # shares of the blocks, and strips of the frame, that run side by side
 EMPTY = 2**64 - 1  # a pixel that nothing was drawn to
 MAX_SIDE = 16384  # pixels: beyond, edge functions leave the range of the original's integers by far
@@ -225,7 +225,7 @@ def _make_work(
 ) -> Work:
     """Play all warps in lockstep and count."""
     blocks, pixels = -(-len(triangles) // block), width * height
-    unroll = UNROLLED if simt.coalescing == Coalescing.WARP_SECTORS else 1
+    unroll = UNROLLED_LOG2 if simt.coalescing == Coalescing.WARP_SECTORS else 0
     second = -(-4 * pixels // 256) * 256
     shape = FrameShape(width, 8, 1, 0, unroll) if packing == "64" else FrameShape(width, 4, 2, second, unroll)
     plane = max(shape.plane_bytes, shape.word_bytes * pixels)

@@ -18,7 +18,7 @@ class FrameShape(NamedTuple):
     word_bytes: int
     words: int  # atomics a fragment
     plane_bytes: int  # bytes from a fragment's one word to the next
-    unroll: int  # pixels in a turn of the inner loop
+    unroll_log2: int  # of the pixels in a turn of the inner loop
 
 
 class Lanes(NamedTuple):

@@ -18,28 +18,28 @@ _HALF = _PIXEL / 2
 
 @kernel(lent=True)
 def take_boxes(pieces: Pieces, lanes: Lanes, shape: FrameShape, row: Any) -> int:
-    """Fetch corners and box of each lane's piece; returns the most rows of any."""
+    """Fetch corners and box of each lane's piece; returns the most rows of any.
+
+    No branch: a lane without a piece has the first piece's corners, and no rows.
+    """
     active, boxes, most, lane_rows, tests = 0, 0, 0, 0, 0
-    box, corner = lanes.box, lanes.corner
+    box, corner, shift = lanes.box, lanes.corner, shape.unroll_log2
     for lane in range(WARP):
-        box[2 * WARP + lane] = 0
-        p = lanes.piece[lane]
-        if p < 0:
-            continue
-        active += 1
+        p = np.uint64(max(lanes.piece[lane], 0))
         x0, x1, y0, y1 = pieces.box[p, 0], pieces.box[p, 1], pieces.box[p, 2], pieces.box[p, 3]
-        if x1 < x0 or y1 < y0:
-            continue
-        boxes += 1
-        rows, columns = np.uint32(y1 - y0 + 1), np.uint32(x1 - x0 + 1)  # divided faster than a signed number
-        box[lane], box[WARP + lane], box[2 * WARP + lane], box[3 * WARP + lane] = x0, y0, rows, columns
-        turns = columns // np.uint32(shape.unroll)
-        box[4 * WARP + lane], box[5 * WARP + lane] = columns - turns * np.uint32(shape.unroll), turns
+        has = (lanes.piece[lane] >= 0) & (x1 >= x0) & (y1 >= y0)
+        box[lane], box[WARP + lane] = x0, y0
+        box[2 * WARP + lane], box[3 * WARP + lane] = (y1 - y0 + 1, x1 - x0 + 1) if has else (0, 0)
         for k in range(6):
             corner[k * WARP + lane] = pieces.corner[p, k]
-        most = max(most, int(rows))
-        lane_rows += int(rows)
-        tests += int(rows) * int(columns)
+    for lane in range(WARP):  # several at once
+        rows, columns = int(box[2 * WARP + lane]), int(box[3 * WARP + lane])
+        box[4 * WARP + lane], box[5 * WARP + lane] = columns - (columns >> shift << shift), columns >> shift
+        active += lanes.piece[lane] >= 0
+        boxes += rows > 0
+        most = max(most, rows)
+        lane_rows += rows
+        tests += rows * columns
     row[FreePipeEvent.SETUP_STEPS] += 1
     row[FreePipeEvent.SETUP_LANES] += active
     row[FreePipeEvent.BOX_STEPS] += boxes > 0

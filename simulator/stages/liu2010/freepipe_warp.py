@@ -194,7 +194,7 @@ def _scan(
     for r in range(rows):
         rest, turns = longest(lanes.box, r)
         rest_steps += rest
-        steps += rest + turns * shape.unroll
+        steps += rest + (turns << shape.unroll_log2)
         cover_row(lanes.edge, lanes.box, lanes.span, r)
         if frame is not None:
             _start_depths(pieces, lanes, r)
@@ -203,7 +203,7 @@ def _scan(
             hit_steps += _loop(pieces, lanes, rest, t0, shape, simt, row, chunks, frame)
         if turns > 0:
             find_steps(lanes, True)
-            hit_steps += _loop(pieces, lanes, turns * shape.unroll, t0, shape, simt, row, chunks, frame)
+            hit_steps += _loop(pieces, lanes, turns << shape.unroll_log2, t0, shape, simt, row, chunks, frame)
         for lane in range(WARP):
             lanes.first[lane] += shape.width
     row[FreePipeEvent.WARP_STEPS] += steps
