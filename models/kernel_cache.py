@@ -201,7 +201,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         """As Numba's, with the options and with the names and order of the fields of what is passed in."""
         options = sorted((name, str(value)) for name, value in self._dispatcher.targetoptions.items())
-        called_by = ("hidden", "kernels", "whole") if nested() else ("hidden",)
+        called_by = ("counters seen", "kernels") if nested() else ("counters seen",)
         return (*super()._index_key(sig, codegen), str(options), _fields(sig), *called_by)
 
 

@@ -17,6 +17,7 @@ from numba.core.cpu import CPUContext
 from numba.core.environment import lookup_environment
 
 TRIED = ("0.68",)  # versions of Numba whose private parts are known here
+COUNTERS = "NRT_incref", "NRT_decref"  # of references: Numba leaves out what cancels, and knows them by name
 _CALLED_BY_KERNELS = ("numba", __name__.split(".")[0])  # stand-ins for functions, of Numba and of ours
 _outermost: list["_Nesting"] = []  # of the kernel that is being compiled for Python, under Numba's compiler lock
 
@@ -38,7 +39,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
     def serialize(self) -> tuple[str, str, bytes]:
         """Its bitcode, with all that it calls."""
         whole = self._own_module().clone()
-        self._link_into(whole)
+        self._link_into(whole, COUNTERS)
         return self.name, "bitcode", whole.as_bitcode()
 
     def add_linking_library(self, library: Any) -> None:
@@ -58,7 +59,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
         for environment in environments(self._final_module):
             self._codegen.set_env(environment.env_name, environment)
 
-    def _link_into(self, module: Any) -> None:
+    def _link_into(self, module: Any, seen_by_all: tuple[str, ...] = ()) -> None:
         """Add what is reached, each function once, and hide it: names are unique in one process alone."""
         own = set(_defined(module))
         seen, left, finished = {id(self)}, list(self._linking_libraries), []
@@ -76,7 +77,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
         for library in finished:  # last: of a finished one LLVM takes only what is called by then
             module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001
         for name in _defined(module):
-            if name not in own:
+            if name not in own and name not in seen_by_all:
                 module.get_function(name).linkage = "internal"
 
     def _own_module(self) -> Any:
