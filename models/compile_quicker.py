@@ -1,8 +1,9 @@
-"""Type inference that remembers, and no garbage collector, while a kernel is compiled: a fifth less of the time.
+"""A third less of the time that a kernel takes to compile, in Python that Numba leaves out of account.
 
-Numba looks anew for the implementation of each ``+``, ``[]`` and ``len`` of each line, through all that it knows by
-that name; nine of ten were found before. And its collector looks again and again through all of the compiler's objects,
-nearly all of which are still in use.
+It looks anew for the implementation of each ``+``, ``[]`` and ``len`` of each line, through all that it knows by that
+name; nine of ten were found before. The collector looks again and again through all of the compiler's objects, nearly
+all of which are still in use. After each pass it works out where each variable lives, which is read once. It paints
+messages of errors that it catches itself, and tells listeners of each call of LLVM.
 """
 
 import gc
@@ -11,11 +12,17 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+from llvmlite.binding.ffi import lib
+from numba.core import errors, event, ir
+from numba.core.postproc import PostProcessor, VariableLifetime
 from numba.core.targetconfig import ConfigStack, TargetConfig
+from numba.core.transforms import canonicalize_cfg
 from numba.core.types.functions import BaseFunction
 
+_UNHEARD = "numba:llvm_lock", "numba:compiler_lock"
 _found: dict[Any, Any] = {}  # signatures, by function, types, and the options it is compiled with
-_resolve, _equal, _hash = BaseFunction.get_call_type, TargetConfig.__eq__, TargetConfig.__hash__
+_resolve, _equal, _process = BaseFunction.get_call_type, TargetConfig.__eq__, PostProcessor.run
+_start, _end = event.start_event, event.end_event
 
 
 def _remembered(function: Any, context: Any, args: Any, keywords: Any) -> Any:
@@ -44,24 +51,75 @@ def _hash_of_names(names: tuple[str, ...]) -> int:
     return hash(tuple(sorted(names)))
 
 
+def _processed(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """As Numba's, but for the lives of variables where they are not wanted: they are found when they are read."""
+    function = self.func_ir
+    if function.is_generator:
+        _process(self, emit_dels, extend_lifetimes)
+        return
+    function.blocks = canonicalize_cfg(function.blocks)
+    function.variable_lifetime = VariableLifetime(function.blocks)
+    function.generator_info = None
+    if emit_dels:
+        self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
+def _variables(values: Any) -> list[Any]:
+    """Variables among values, in their order, as Numba's, in a third of the time."""
+    found = []
+    for value in values:
+        kind = value.__class__
+        if kind is ir.Var:
+            found.append(value)
+        elif kind is list or kind is tuple:
+            found += _variables(value)
+        elif kind is dict:
+            found += _variables(value.values())
+        elif isinstance(value, ir.Inst):
+            found += value.list_vars()
+    return found
+
+
+def _started(kind: str, data: Any = None) -> None:
+    if kind not in _UNHEARD:
+        _start(kind, data)
+
+
+def _ended(kind: str, data: Any = None, exc_details: Any = None) -> None:
+    if kind not in _UNHEARD:
+        _end(kind, data, exc_details)
+
+
+def _plain(_scheme: Any, message: str, *_style: Any) -> str:
+    return message
+
+
+REPLACED: list[tuple[Any, str, Any]] = [
+    (BaseFunction, "get_call_type", _remembered),
+    (TargetConfig, "__eq__", _same_options),
+    (TargetConfig, "__hash__", _hash_of_options),
+    (PostProcessor, "run", _processed),
+    (ir.Expr, "list_vars", lambda expression: _variables(expression._kws.values())),  # noqa: SLF001
+    (ir.Stmt, "list_vars", lambda statement: _variables(statement.__dict__.values())),
+    (event, "start_event", _started),
+    (event, "end_event", _ended),
+    (lib._lock, "_cblist", []),  # noqa: SLF001
+]
+if hasattr(errors, "HighlightColorScheme"):  # where colorama is installed
+    REPLACED.append((errors.HighlightColorScheme, "_markup", _plain))
+
+
 @contextmanager
 def quicker() -> Iterator[None]:
     """Compile within; under Numba's compiler lock, and of the versions whose private parts are known."""
-    collects = gc.isenabled()
+    collects, usual = gc.isenabled(), [(of, name, getattr(of, name)) for of, name, _ in REPLACED]
     gc.disable()
-    _replace(_remembered, _same_options, _hash_of_options)
     try:
+        for of, name, made in REPLACED:
+            setattr(of, name, made)
         yield
     finally:
-        _replace(_resolve, _equal, _hash)
+        for of, name, made in usual:
+            setattr(of, name, made)
         if collects:
             gc.enable()
-
-
-def _replace(resolve: Any, equal: Any, hashed: Any) -> None:
-    for of, name, method in (
-        (BaseFunction, "get_call_type", resolve),
-        (TargetConfig, "__eq__", equal),
-        (TargetConfig, "__hash__", hashed),
-    ):
-        setattr(of, name, method)

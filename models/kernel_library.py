@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numba
-from llvmlite.binding import parse_bitcode
+from llvmlite.binding import create_new_function_pass_manager, parse_bitcode
 from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.cpu import CPUContext
@@ -58,6 +58,20 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]  # numba has no types
         super().finalize()
         for environment in environments(self._final_module):
             self._codegen.set_env(environment.env_name, environment)
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Make each function small, as it is kept and linked; Numba would optimise it as far as it goes by itself."""
+        codegen, passes = self._codegen, create_new_function_pass_manager()
+        module.data_layout, builder = codegen._data_layout, codegen._pass_builder()  # noqa: SLF001
+        passes.add_sroa_pass()
+        passes.add_instruction_combine_pass()
+        for name in _defined(module):
+            passes.run(module.get_function(name), builder)
+
+    def _optimize_final_module(self) -> None:
+        """Optimise once; Numba does so twice, for a better chance to drop counts of references."""
+        passes, builder = self._codegen._module_pass_manager()  # noqa: SLF001
+        passes.run(self._final_module, builder)
 
     def _link_into(self, module: Any, seen_by_all: tuple[str, ...] = ()) -> None:
         """Add what is reached, each function once, and hide it: names are unique in one process alone."""

@@ -86,7 +86,7 @@ def _price(launch: Shape, units: Kinds, totals: Any, machines: Any, facts: Any, 
         if not _alike(matrix, seen):
             whole = demands(units, matrix, sums, found)
             load_units(found, sm, own, alone)
-            seen[:], settled = matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            matrix, seen, settled = seen, matrix, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         terms = row[:TAIL]
         bound_terms(launch, whole, totals, machine, fact, terms)
         if scheduled:
