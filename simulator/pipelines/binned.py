@@ -148,7 +148,7 @@ def binned(
         rop, data, tiles, fragments, stream, simt, order=options.order, fragment_depth=options.fragment_depth,
         limit=options.fragments_a_pixel, optimized=optimized, zero_ends=options.original_faults,
     )  # fmt: skip
-    image = execute(streaming_to_frame_buffer, pixels.target, simt, optimized=optimized).outputs
+    image = execute(streaming_to_frame_buffer, pixels, simt, optimized=optimized).outputs
 
     in_stream = int(np.bitwise_count(stream.shaded).sum(dtype=np.int64))
     facts = {

@@ -106,9 +106,9 @@ def fine_rasterizer(
         _fine_rasterizer, parts_of(rows), *data[:2], tiles.starts, tiles.entries, tiles.columns, simt.warp, early_z,
         optimized, *out, events,
     )  # fmt: skip
-    _add_costs(events, simt, optimized)
     group = TILES_A_BLOCK if optimized else 1
     table = _by_block(events, group)
+    _add_costs(table, simt, optimized)
     total = table.sum(axis=0)
     pixels = width * height
     drawn = int(np.count_nonzero(np.bincount(tiles.entries)))
@@ -148,17 +148,17 @@ def _add_costs(events: NDArray[np.int64], simt: Simt, optimized: bool) -> None:
     """Add what follows from the counts: one atomicAdd a round, memory."""
     event = FineRasterizerEvent
     segment = smallest_transaction_bytes(int(simt.coalescing))
-    rounds, quads = events[..., event.ROUNDS], events[..., event.QUADS]
+    rounds, quads = events[:, event.ROUNDS], events[:, event.QUADS]
     for name in (event.ATOMIC, event.ATOMIC_LANES, event.ATOMIC_REQUESTS, event.ATOMIC_DEPTH):
-        events[..., name] = rounds
-    depths = 8 * events[..., event.WARPS]  # eight rows of 32 bytes, read and written
-    lanes = events[..., event.ROUND_LANES]
+        events[:, name] = rounds
+    depths = 8 * events[:, event.WARPS]  # eight rows of 32 bytes, read and written
+    lanes = events[:, event.ROUND_LANES]
     setup = SETUP_BYTES // 4 * lanes
     if optimized:
-        setup = (EDGE_WORDS + QUAD_WORDS) * lanes + DEPTH_WORDS * events[..., event.SAMPLE_HITS]
-    queues = 2 * events[..., event.WARPS] + events[..., event.GROUP_STEPS]  # eight numbers of primitives a sector
+        setup = (EDGE_WORDS + QUAD_WORDS) * lanes + DEPTH_WORDS * events[:, event.SAMPLE_HITS]
+    queues = 2 * events[:, event.WARPS] + events[:, event.GROUP_STEPS]  # eight numbers of primitives a sector
     sectors = quads * (4 * FRAGMENT_STORES if optimized else 4 * FRAGMENT_BYTES // 16)
-    events[..., event.LOAD_TRANSACTIONS] = depths + setup + queues
-    events[..., event.LOAD_BYTES] = events[..., event.LOAD_TRANSACTIONS] * segment
-    events[..., event.STORE_TRANSACTIONS] = depths + sectors
-    events[..., event.STORE_BYTES] = (depths + sectors) * 32
+    events[:, event.LOAD_TRANSACTIONS] = depths + setup + queues
+    events[:, event.LOAD_BYTES] = events[:, event.LOAD_TRANSACTIONS] * segment
+    events[:, event.STORE_TRANSACTIONS] = depths + sectors
+    events[:, event.STORE_BYTES] = (depths + sectors) * 32

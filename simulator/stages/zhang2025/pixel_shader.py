@@ -170,7 +170,9 @@ def pixel_shader(
         for_parts(_pixel_shader, parts_of(count, BLOCK), *inputs)
     else:
         for_parts(_pixel_shader_planes, parts_of(count, BLOCK), lanes, *inputs)
-    _add_costs(events, optimized)
+    used = -(-count // BLOCK)
+    _add_costs(events[: used + 1], optimized)
+    events[used + 1 :] = events[used : used + 1]  # blocks without a fragment
     total = dict(zip(PixelShaderEvent, events.sum(axis=0).tolist(), strict=True))
     texels = min(total[PixelShaderEvent.TEXTURE_BYTES], len(chains.texels) * TEXEL_BYTES)  # neighbours reuse them
     read, stored = count * FRAGMENT_BYTES, total[PixelShaderEvent.STORE_BYTES]

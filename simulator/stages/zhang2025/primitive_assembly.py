@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.atomics import count_atomics
-from tilestamp.models.coalescing import smallest_transaction_bytes, transactions
+from tilestamp.models.coalescing import SEGMENT_BYTES, smallest_transaction_bytes, transactions
 from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
@@ -79,17 +79,20 @@ def _put(
         screen[k, 1] = (vertices[v, 1] / w + _ONE) * _HALF * height
         screen[k, 2] = (vertices[v, 2] / w + _ONE) * _HALF
         screen[k, 3] = w
-        for n in range(VARYINGS):
-            varyings[k, n] = vertices[v, 4 + n]
     ux, uy = screen[1, 0] - screen[0, 0], screen[1, 1] - screen[0, 1]
     vx, vy = screen[2, 0] - screen[0, 0], screen[2, 1] - screen[0, 1]
     area = ux * vy - uy * vx
-    if area < _ZERO and not culling:  # the edge functions want counter-clockwise corners
+    if not (area > _ZERO or (area < _ZERO and not culling)):
+        return False
+    if area < _ZERO:  # the edge functions want counter-clockwise corners
         for n in range(4):
             screen[1, n], screen[2, n] = screen[2, n], screen[1, n]
+        b, c = c, b
+    for k in range(3):
+        v = a if k == 0 else b if k == 1 else c
         for n in range(VARYINGS):
-            varyings[1, n], varyings[2, n] = varyings[2, n], varyings[1, n]
-    return area > _ZERO or (area < _ZERO and not culling)
+            varyings[k, n] = vertices[v, 4 + n]
+    return True
 
 
 @kernel(error_model="numpy", lent=True)
@@ -131,7 +134,7 @@ def _primitive_assembly(
 @kernel(error_model="numpy")
 def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int, events: Any) -> None:
     """Indices, the vertices that they fetch, and the atomics of the clipped lanes, warp by warp."""
-    addresses = np.empty(warp, np.int64)
+    addresses, indices = np.empty(warp, np.int64), np.empty((3, 2), np.int64)
     for first in range(0, len(triangles), warp):
         row = events[first // BLOCK]
         row[PrimitiveAssemblyEvent.WARPS] += 1
@@ -141,9 +144,11 @@ def _count_memory(triangles: Any, clipped: Any, warp: int, rule: int, merge: int
             count, size = transactions(addresses, warp, 4, rule)
             row[PrimitiveAssemblyEvent.LOAD_TRANSACTIONS] += count * (VERTEX_BYTES // 4)
             row[PrimitiveAssemblyEvent.LOAD_BYTES] += size * (VERTEX_BYTES // 4)
-            for lane in range(warp):
-                addresses[lane] = (3 * (first + lane) + k) * 4 if first + lane < len(triangles) else -1
-            count, size = transactions(addresses, warp, 4, rule)
+            if first == 0 or first + warp > len(triangles) or 12 * warp % SEGMENT_BYTES:  # or in lines as the first's
+                for lane in range(warp):
+                    addresses[lane] = (3 * (first + lane) + k) * 4 if first + lane < len(triangles) else -1
+                indices[k, 0], indices[k, 1] = transactions(addresses, warp, 4, rule)
+            count, size = indices[k]
             row[PrimitiveAssemblyEvent.LOAD_TRANSACTIONS] += count
             row[PrimitiveAssemblyEvent.LOAD_BYTES] += size
         for lane in range(warp):

@@ -13,6 +13,7 @@ from tilestamp.models.simt import Simt
 from tilestamp.simulator.parallel import for_parts, parts_of
 from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.thread_per_item import Access, thread_per_item
+from tilestamp.simulator.stages.zhang2025.rop import Resolved
 
 BLOCK = 256  # threads
 _ZERO = np.float32(0.0)
@@ -21,24 +22,24 @@ _FULL = np.float32(255.0)
 
 
 @kernel(error_model="numpy", lent=True)
-def _streaming(part: int, parts: int, target: Any, image: Any) -> None:
-    """Convert a part of the rows, the last one first."""
+def _streaming(part: int, parts: int, target: Any, winners: Any, image: Any) -> None:
+    """Convert a part of the rows, the last one first; where nothing was drawn the target is still clear."""
     rows = len(target)
     for y in range(part * rows // parts, (part + 1) * rows // parts):
         for x in range(target.shape[1]):
+            if winners[y, x] < 0:
+                image[rows - 1 - y, x, 0] = image[rows - 1 - y, x, 1] = image[rows - 1 - y, x, 2] = 0
+                continue
             for c in range(3):
                 image[rows - 1 - y, x, c] = np.uint8(min(max(target[y, x, c], _ZERO), _ONE) * _FULL)
 
 
-def streaming_to_frame_buffer(
-    target: NDArray[np.float32], simt: Simt, *, optimized: bool
-) -> StageResult[NDArray[np.uint8]]:
+def streaming_to_frame_buffer(pixels: Resolved, simt: Simt, *, optimized: bool) -> StageResult[NDArray[np.uint8]]:
     """Convert the render target.
 
     Parameters
     ----------
-    target : ndarray, (H, W, 4), float32
-        Rows from the bottom.
+    pixels : Resolved
     simt : Simt
     optimized : bool
 
@@ -48,11 +49,10 @@ def streaming_to_frame_buffer(
         The picture; row 0 is the top row.
     works : one
     """
-    image = np.empty((*target.shape[:2], 3), np.uint8)
-    for_parts(_streaming, parts_of(len(target)), target, image)
+    image = np.empty((*pixels.winners.shape, 3), np.uint8)
+    for_parts(_streaming, parts_of(len(image)), pixels.target, pixels.winners, image)
     loads = (Access("target", 16, 1, 16),)
     stores = (Access("window", 4, 1) if optimized else Access("window", 4, 4, 1),)
     kernel = "StreamingToFrameBuffer" if optimized else "StreamingToFrameBuffer_before"
-    pixels = target.shape[0] * target.shape[1]
-    work = thread_per_item("StreamingToFrameBuffer", kernel, pixels, BLOCK, simt, loads, stores)
+    work = thread_per_item("StreamingToFrameBuffer", kernel, pixels.winners.size, BLOCK, simt, loads, stores)
     return StageResult(image, (work,))
