@@ -62,7 +62,10 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     if isinstance(sys.stdout, io.TextIOWrapper):  # a name that the terminal has no letters for is escaped
         sys.stdout.reconfigure(errors="backslashreplace")
-    sys.exit(run_command(sys.argv[1:]))
+    try:
+        sys.exit(run_command(sys.argv[1:]))
+    finally:
+        gc.freeze()  # or Python looks through all that was imported for garbage, several times, before the process ends
 
 
 def _terminate(_signal: int, _frame: FrameType | None) -> None:
