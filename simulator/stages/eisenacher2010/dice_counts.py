@@ -1,11 +1,13 @@
 """What the machine does while it dices: a thread a vertex, a half-warp a sub-patch (Eisenacher & Loop 2010, 3)."""
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tilestamp.models.coalescing import transactions
+from tilestamp.models.kernel import kernel
 from tilestamp.models.launch import Stream
 from tilestamp.models.simt import Simt
 from tilestamp.simulator.work import Work
@@ -57,11 +59,15 @@ def dice_work(patch: NDArray[np.int32], patches: int, textured: bool, simt: Simt
     table[:, _E.VERTEX_LANES] = grids * vertices
     table[:, _E.VERTEX_WARPS] = -(-grids * vertices // simt.warp)
     table[:, _E.TEXTURE_LANES] = grids * vertices * textured
-    table[:, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES]] = _points(patch, per_block, simt)
-    for count in np.unique(grids):
-        queue, stores = _block_traffic(int(count), vertices, simt)
-        table[np.ix_(grids == count, [_E.LOAD_TRANSACTIONS, _E.LOAD_BYTES])] += queue
-        table[np.ix_(grids == count, [_E.STORE_TRANSACTIONS, _E.STORE_BYTES])] = stores
+    loads, stores = (
+        table[:, _E.LOAD_TRANSACTIONS : _E.STORE_TRANSACTIONS],
+        table[:, _E.STORE_TRANSACTIONS : _E.TEXTURE_LANES],
+    )
+    loads[:] = _points(patch, per_block, simt)
+    for rows in (slice(-1), slice(-1, None)):  # all blocks but the last are alike
+        if len(grids[rows]):
+            queue, stores[rows] = _block_traffic(int(grids[rows][0]), vertices, simt)
+            loads[rows] += queue
     moved, stored = int(table[:, _E.LOAD_BYTES].sum()), int(table[:, _E.STORE_BYTES].sum())
     entries, boxes = number * ENTRY_BYTES, number * BOX_BYTES
     streams = (
@@ -80,23 +86,29 @@ def _points(patch: NDArray[np.int32], per_block: int, simt: Simt) -> NDArray[np.
     queue come from one urPatch. So a warp touches the segments of as many urPatches as it has different ones.
     """
     together = max(1, simt.warp // VERTICES)
-    blocks, warps = -(-len(patch) // per_block), -(-per_block // together)
-    padded = np.full((blocks, warps * together), -1, np.int32)
-    whole = len(patch) // per_block
-    padded[:whole, :per_block] = patch[: whole * per_block].reshape(whole, per_block)
-    padded[whole:, : len(patch) % per_block] = patch[whole * per_block :]
-    lanes = [padded[:, lane::together] for lane in range(together)]  # a grid of each warp, (blocks, warps)
-    loads = np.zeros((blocks, 2), np.int64)
-    grids = sum((lane >= 0).astype(np.int8) for lane in lanes)
-    different = sum(
-        ((lane >= 0) & np.logical_and.reduce([lane != other for other in lanes[:k]])).astype(np.int8)
-        for k, lane in enumerate(lanes)
-    )
+    costs = np.zeros((together + 1, together + 1, 2), np.int64)  # by grids of a warp, and different urPatches
     for number in range(1, together + 1):
         for patches in range(1, number + 1):
-            cost = _warp_points(np.minimum(np.arange(number), patches - 1), simt)
-            loads += np.multiply.outer(np.count_nonzero((grids == number) & (different == patches), axis=1), cost)
+            costs[number, patches] = _warp_points(np.minimum(np.arange(number), patches - 1), simt)
+    loads = np.zeros((-(-len(patch) // per_block), 2), np.int64)
+    _add_points(patch, per_block, together, costs, loads)
     return loads
+
+
+@kernel(lent=True)
+def _add_points(patch: Any, per_block: int, together: int, costs: Any, loads: Any) -> None:
+    """Add up the costs of the warps of each block."""
+    for block in range(loads.shape[0]):
+        last = min((block + 1) * per_block, patch.size)
+        for first in range(block * per_block, last, together):
+            grids, different = min(together, last - first), 0
+            for k in range(first, first + grids):
+                known = False
+                for other in range(first, k):
+                    known |= patch[other] == patch[k]
+                different += not known
+            loads[block, 0] += costs[grids, different, 0]
+            loads[block, 1] += costs[grids, different, 1]
 
 
 def _warp_points(patch: NDArray[np.int64], simt: Simt) -> NDArray[np.int64]:

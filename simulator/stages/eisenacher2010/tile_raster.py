@@ -131,7 +131,8 @@ def raster_streams(
     seen = np.zeros(grids, np.bool_)
     seen[lists] = True
     drawn = int(np.count_nonzero(seen))
-    vertex_bytes = int(block_traffic(shape, simt).grid[lists % ALIGNMENTS, 1].sum())
+    alignments = np.bincount(lists & np.uint32(ALIGNMENTS - 1), minlength=ALIGNMENTS)
+    vertex_bytes = int(alignments @ block_traffic(shape, simt).grid[:, 1])
     edge_bytes = len(lists) * shape.loaded * VECTOR_BYTES
     rest = int(total[_E.LOAD_BYTES]) - vertex_bytes - edge_bytes - others
     stored, row = int(total[_E.STORE_BYTES]), max(SECTOR_BYTES, shape.tile * WORD_BYTES)
