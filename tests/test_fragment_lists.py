@@ -89,6 +89,12 @@ def test_atomics_on_the_counter_of_nodes(layout, lanes_of):
     assert list(work.atomic_requests) == [starts, lanes]
 
 
+def test_an_allocation_loads_nothing():
+    works = [draw(soup(8, 30), layout)[1] for layout in LAYOUTS]
+    loads = ListEvent["LOAD_TRANSACTIONS"], ListEvent["LOAD_BYTES"]
+    assert len({tuple(work.total(event) for event in loads) for work in works}) == 1
+
+
 def test_fixed_lists_want_no_atomic():
     work = keep(soup(13), "fixed").works[0]
     assert work.total(ListEvent["ALLOCATIONS"]) == 0

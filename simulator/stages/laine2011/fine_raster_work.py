@@ -65,8 +65,8 @@ def _add_starts(rows: NDArray[np.int64], warps: int, segment_bytes: int) -> None
     E, starts = FineRasterEvent, np.bincount(np.arange(warps) % len(rows))
     for event in (E.WARP_STARTS, E.ATOMIC, E.ATOMIC_LANES, E.ATOMIC_REQUESTS, E.ATOMIC_DEPTH):
         rows[: len(starts), event] += starts
-    loads = rows[:, E.ATOMIC].copy()  # with each draw the number of tiles
-    loads[: len(starts)] += START_LOADS * starts
+    loads = np.ones(len(rows), np.int64)  # with each draw, here of a tile, the number of tiles
+    loads[: len(starts)] += (1 + START_LOADS) * starts
     rows[:, E.LOAD_TRANSACTIONS] += loads
     rows[:, E.LOAD_BYTES] += loads * segment_bytes
 
