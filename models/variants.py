@@ -35,6 +35,10 @@ class Variants(Sequence[Machine]):
     def __init__(self, base: Machine, columns: Columns) -> None:
         self.base, self._columns = base, columns
 
+    def __repr__(self) -> str:
+        """How many, of which machine, and what differs."""
+        return f"{len(self)} machines: {self.base.name} with other {', '.join(self._columns)}"
+
     def __len__(self) -> int:
         """How many machines."""
         return len(next(iter(self._columns.values())))
@@ -76,7 +80,7 @@ def variants(machine: Machine, numbers: Mapping[str, ArrayLike]) -> Sequence[Mac
     TilestampError
         Columns of unequal length, or what ``altered`` refuses.
     """
-    columns = {key: np.atleast_1d(np.asarray(column)) for key, column in numbers.items()}
+    columns = {key: np.atleast_1d(np.array(column)) for key, column in numbers.items()}  # its owner may change it later
     lengths = {len(column) for column in columns.values()} - {1}
     if len(lengths) > 1 or any(column.ndim != 1 for column in columns.values()):
         told = ", ".join(f"{key} {column.shape}" for key, column in columns.items())

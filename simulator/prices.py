@@ -119,7 +119,7 @@ def _groups(
     groups: dict[int, tuple[Launches, list[int]]] = {}
     refusals: dict[int, str] = {}
     known: dict[Hashable, Launches] = {}
-    if isinstance(machines, Variants):
+    if isinstance(machines, Variants) and machines:
         with suppress(TilestampError):  # with what each of them is called
             launches = launches_on(machines[0])
             check_prices(launches, machines[0])

@@ -138,7 +138,8 @@ def _map(run: PricedFrame, into: "Into", counter: str) -> "Axes":
     maps = run.frame.maps
     name = counter or next(iter(maps), "map")
     if name not in maps:
-        has = f"it has {', '.join(maps)}" if maps else "it has none, or only numbers were asked for"
+        why = ", or only numbers were asked for" if not maps else ""
+        has = f"it has {', '.join(maps) or 'none'}{why if run.counted else ' where nothing is counted'}"
         raise TilestampError(f"the pipeline {run.pipeline} draws no map of {name}; {has}")
     by_pixel = maps[name].shape == (run.height, run.width)
     tile, from_below = (1, False) if by_pixel else (run.frame.tile, run.frame.tiles_from_below)

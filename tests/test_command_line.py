@@ -132,12 +132,12 @@ def test_a_map_that_the_pipeline_does_not_draw_leaves_no_picture_behind(tmp_path
 
 
 def test_without_counting_there_is_a_picture_and_no_time(tmp_path, capsys):
-    options = ["render", "teapot", *SMALL, "--no-counting"]
-    assert run_command(options) == BAD_INPUT
-    assert "nothing was counted, so there is no time" in capsys.readouterr().err
-    assert run_command([*options, "-o", str(tmp_path / "out.png")]) == 0
+    options = ["render", "teapot", *SMALL, "--no-counting", "-o", str(tmp_path / "out.png")]
+    assert run_command(options) == 0
     assert (tmp_path / "out.png").exists()
     assert "nothing was counted, so there is no time" in capsys.readouterr().out
+    assert run_command([*options, "--map", "tests"]) == BAD_INPUT
+    assert "it has none where nothing is counted" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

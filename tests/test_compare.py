@@ -166,7 +166,9 @@ def test_render_writes_what_explains_a_run(tmp_path, capsys):
         (["--trace", "s.json"], ".json.gz"),
         (["--timeline", "nowhere/l.png"], "no folder"),
         (["--tornado", "t.gif"], ".png"),
-        (["--why", "--fidelity", "counts"], "explain times"),
+        (["--why", "--fidelity", "counts"], "explain times: --fidelity counts has none"),
+        (["--trace", "s.json.gz", "--no-counting", "-o", "out.png"], "explain times: --no-counting has none"),
+        (["--no-counting"], "give -o FILE.png"),
     ],
 )
 def test_what_cannot_be_explained_is_refused_before_anything_is_drawn(flags, says, capsys):

@@ -48,6 +48,12 @@ def test_numbers_of_many_machines_are_taken_as_columns(run, numbers):
     assert got.frame.tolist() == run.prices(list(variants(run.machine, NUMBERS))).frame.tolist()
 
 
+def test_no_machines_of_many_have_no_prices(run):
+    got = run.prices(variants(run.machine, NUMBERS)[3:])
+    assert got.milliseconds.shape == (0, len(run.timings))
+    assert got.table().empty
+
+
 def test_a_lone_number_is_that_of_all_machines(run):
     machines = variants(run.machine, NUMBERS | {"memory.l2_bytes": 10**6})
     assert [machine.memory.l2_bytes for machine in machines] == [10**6] * 3

@@ -50,5 +50,17 @@ def test_whoever_collects_learns_of_each_machine():
     assert set(found["machines"]) == {machine.name for machine in EACH}
 
 
+def test_a_column_that_is_changed_later_changes_no_machine():
+    clocks = np.array([900.0, 1500.0])
+    got = variants(MACHINE, {"sm.clock_mhz": clocks})
+    clocks[:] = -1.0
+    assert [machine.sm.clock_mhz for machine in got] == [900.0, 1500.0]
+
+
+def test_they_say_in_a_line_what_they_are():
+    got = repr(variants(MACHINE, NUMBERS))
+    assert got == "3 machines: h200 with other sm.clock_mhz, memory.dram_gb_per_s"
+
+
 def test_no_columns_are_no_machines():
     assert list(variants(MACHINE, {})) == list(variants(MACHINE, {"sm.clock_mhz": []})) == []

@@ -89,18 +89,21 @@ def render(
     """
     if output is None and map_ is not None:
         raise TilestampError("--map writes beside the picture: give -o FILE.png too")
+    if output is None and not counting:
+        raise TilestampError("--no-counting leaves a picture and no time: give -o FILE.png too")
     for file, flag in ((output, "-o"), (tornado, "--tornado"), (timeline, "--timeline")):
         check_png(file, flag)
     if trace is not None:
         check_file(trace, "--trace", ".json.gz")
     if (why or tornado or trace or timeline) and (fidelity == "counts" or not counting):
-        raise TilestampError("--why, --tornado, --trace and --timeline explain times: --fidelity counts has none")
+        has_none = "--fidelity counts" if counting else "--no-counting"
+        raise TilestampError(f"--why, --tornado, --trace and --timeline explain times: {has_none} has none")
     pixels = parse_size(size) if size else None
     wanted = Wanted(scene, pipeline, machine, pixels, camera, zoom, texture, map_, set_, flags, option)
     asked: dict[str, Any] = {"fidelity": fidelity, "counting": counting}
     with progress(f"drawing {scene}") as say:
         run, chosen = draw(wanted, picture=output is not None, **asked)
-        if run.counted or output is None:  # without counts there is only a picture
+        if run.counted:  # without counts there is only a picture
             say("pricing")
             _ = run.stage_rows
         explained = _explained(run, why, tornado, trace, timeline)
