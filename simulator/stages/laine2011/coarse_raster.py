@@ -22,14 +22,14 @@ from tilestamp.simulator.stage import StageResult
 from tilestamp.simulator.stages.borrow import row_of
 from tilestamp.simulator.stages.laine2011.bin_raster import STREAMS, BinQueues, check_viewport
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import HEADER_BYTES, WARP, place_pairs, transaction_bytes
-from tilestamp.simulator.stages.laine2011.coarse_raster_bin import (
+from tilestamp.simulator.stages.laine2011.coarse_raster_bin import play_bin
+from tilestamp.simulator.stages.laine2011.coarse_raster_count import (
     BIN_TILES,
     BLOCK,
     ENTRY_BYTES,
     TILE_SEGMENT,
     TILES,
     CoarseInput,
-    play_bin,
 )
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
 from tilestamp.simulator.stages.laine2011.triangle_setup_paths import Setup

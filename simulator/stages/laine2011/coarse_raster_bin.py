@@ -8,7 +8,6 @@ bin raster pairs of a tile and an entry are listed first, and put in their place
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tilestamp.models.kernel import kernel
 from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
@@ -19,53 +18,29 @@ from tilestamp.simulator.stages.laine2011.bin_raster_cover import (
     WarpBoxes,
     X,
     Y,
-    count_corners,
-    count_votes,
     find_slots,
-    header_load,
     lane_edges,
     new_boxes,
     touches,
     warp_boxes,
     with_room,
 )
+from tilestamp.simulator.stages.laine2011.coarse_raster_count import (
+    BIN_TILES,
+    BLOCK,
+    CASE_A,
+    CASE_B,
+    CASE_C,
+    TILES,
+    CoarseInput,
+    WarpCase,
+    count_atomic,
+    count_case,
+    count_emits,
+    count_merge,
+    count_tails,
+)
 from tilestamp.simulator.stages.laine2011.coarse_raster_events import CoarseRasterEvent
-
-BLOCK = 512  # threads, and entries of a round
-BIN_SEGMENT = 512  # entries
-TILE_SEGMENT = 32  # entries
-ENTRY_BYTES = 4
-BIN_TILES = 16  # in each axis
-TILES = BIN_TILES * BIN_TILES
-MASK_ROW = TILES + 1  # words: one warp's masks in shared memory
-CASE_A, CASE_B, CASE_C = 0, 1, 2  # of a warp: small boxes, boxes close together, boxes far apart
-
-
-class CoarseInput(NamedTuple):
-    """What bin raster and triangle setup leave, and the grid of tiles."""
-
-    starts: NDArray[np.int64]
-    entries: NDArray[np.int32]
-    batch_counts: NDArray[np.int64]
-    headers: NDArray[np.int16]
-    misc: NDArray[np.uint32]
-    half_x: int  # sub-pixels from the lower-left corner to the centre of the viewport
-    half_y: int
-    bins_x: int
-    tiles_x: int
-    tiles_y: int
-    segment_bytes: int  # of the machine's memory transactions
-    segment_log2: int
-
-
-class WarpCase(NamedTuple):
-    """Which way a warp goes, and what decides it."""
-
-    case: int
-    indirect: bool  # whether an entry is not its triangle's own slot
-    largest: int  # tiles of the largest box
-    union: int  # tiles, and rows of tiles, of the box around all, but in case A
-    rows: int
 
 
 class Place(NamedTuple):
@@ -94,7 +69,7 @@ def _place(given: CoarseInput, b: int) -> Any:
 
 @kernel(lent=True)
 def _load_warp(given: CoarseInput, place: Place, first: int, lanes: int, boxes: WarpBoxes) -> Any:
-    """Boxes of a warp's triangles; returns what ``_count_warp`` takes, tiles of all boxes last."""
+    """Boxes of a warp's triangles; returns what ``count_case`` takes, tiles of all boxes last."""
     indirect = find_slots(given.entries[first : first + lanes], given.misc, boxes)
     largest, area, side = warp_boxes(
         boxes,
@@ -161,131 +136,6 @@ def _emit_warp(boxes: WarpBoxes, lanes: int, counts: Any, pairs: Any, used: int,
     return used
 
 
-@kernel(lent=True)
-def _count_warp(
-    given: CoarseInput, way: WarpCase, area: int, boxes: WarpBoxes, lanes: int, events: Any
-) -> None:  # fmt: skip
-    """Count what a warp's loads and its case cost; its votes are in."""
-    events[CoarseRasterEvent.BOX_TILES] += area
-    events[CoarseRasterEvent.INDIRECT_WARPS] += way.indirect
-    ors, replays = count_corners(boxes.corners) if way.case == CASE_A else count_votes(boxes, way.largest)
-    if way.case == CASE_A:
-        events[CoarseRasterEvent.CASE_A_WARPS] += 1
-    elif way.case == CASE_B:
-        events[CoarseRasterEvent.CASE_B_WARPS] += 1
-        events[CoarseRasterEvent.CASE_B_STEPS] += way.union
-        events[CoarseRasterEvent.CASE_B_ROWS] += way.rows
-        events[CoarseRasterEvent.CASE_B_LANE_STEPS] += area
-        events[CoarseRasterEvent.CASE_B_LANE_ROWS] += way.rows * lanes
-        ors, replays = 0, 0  # lanes hand their tiles on without an atomic
-    else:
-        events[CoarseRasterEvent.CASE_C_WARPS] += 1
-        events[CoarseRasterEvent.CASE_C_STEPS] += way.largest
-        events[CoarseRasterEvent.CASE_C_LANE_STEPS] += area
-    events[CoarseRasterEvent.SHARED_ATOMIC] += ors
-    events[CoarseRasterEvent.BANK_REPLAYS] += replays
-    _count_load(events, 1, *header_load(boxes, lanes, given.segment_bytes))
-
-
-@kernel(lent=True)
-def _count_load(events: Any, loads: int, segments: int, size: int) -> None:
-    events[CoarseRasterEvent.LOAD] += loads
-    events[CoarseRasterEvent.LOAD_TRANSACTIONS] += segments
-    events[CoarseRasterEvent.LOAD_BYTES] += size
-
-
-@kernel(lent=True)
-def _count_atomic(events: Any, executed: int) -> None:
-    """One thread's global atomic."""
-    events[CoarseRasterEvent.ATOMIC] += executed
-    events[CoarseRasterEvent.ATOMIC_LANES] += executed
-    events[CoarseRasterEvent.ATOMIC_REQUESTS] += executed
-    events[CoarseRasterEvent.ATOMIC_DEPTH] += executed
-
-
-@kernel(lent=True)
-def _count_emits(given: CoarseInput, counts: Any, before: Any, tails: Any, events: Any) -> None:
-    """Count a round's tiles, new segments and writes: the block writes the emits in tile order, 32 a warp."""
-    fresh, touched, emits, stores = 0, 0, 0, 0
-    for warp in range(0, counts.size, WARP):
-        linked, opened, most = 0, 0, 0
-        for tile in range(warp, warp + WARP):
-            place, end = before[tile], counts[tile]
-            if place == end:
-                continue
-            new = (end + TILE_SEGMENT - 1) // TILE_SEGMENT - (place + TILE_SEGMENT - 1) // TILE_SEGMENT
-            linked, opened, most = linked + (new > 0), opened + (new > 0 and place == 0), max(most, end - place)
-            before[tile] = end
-            touched += 1
-            fresh += new
-            if new > 0:
-                tails[TILES] += new
-                tails[tile] = tails[TILES]
-            while place < end:  # the part of a tile's emits that one warp writes
-                part = min(end - place, WARP - emits % WARP)
-                first, last = place * ENTRY_BYTES, (place + part) * ENTRY_BYTES - 1
-                stores += (last >> given.segment_log2) - (first >> given.segment_log2) + 1
-                place, emits = place + part, emits + part
-        events[CoarseRasterEvent.LINK_WARPS] += linked > 0
-        events[CoarseRasterEvent.FIRST_WARPS] += opened > 0
-        events[CoarseRasterEvent.SCAN_WARPS] += most > 1
-        stores += linked - opened + ((opened * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)
-    events[CoarseRasterEvent.TILES_TOUCHED] += touched
-    events[CoarseRasterEvent.EMITS] += emits
-    events[CoarseRasterEvent.EMIT_STEPS] += (emits + BLOCK - 1) // BLOCK
-    events[CoarseRasterEvent.EMIT_WARPS] += (emits + WARP - 1) // WARP
-    events[CoarseRasterEvent.EMIT_BLOCK_WARPS] += min((emits + WARP - 1) // WARP, BLOCK // WARP)
-    events[CoarseRasterEvent.SEGMENT_WARPS] += (fresh + WARP - 1) // WARP
-    stores += 2 * ((fresh * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2)  # links and counts
-    events[CoarseRasterEvent.SEGMENTS] += fresh
-    events[CoarseRasterEvent.ALLOC_ROUNDS] += fresh > 0
-    events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
-    events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
-    _count_atomic(events, fresh > 0)
-
-
-@kernel(lent=True)
-def _count_tails(given: CoarseInput, counts: Any, tails: Any, events: Any) -> None:
-    """Count the writes that end the tiles' lists: the last segment's link, and its count where it is not full.
-
-    ``tails`` numbers the last segment of each tile in the order of allocation.
-    """
-    links, sizes = -1, -1
-    for tile in range(TILES):
-        if tile % WARP == 0:
-            links, sizes = -1, -1
-        here, stores = tails[tile] * ENTRY_BYTES >> given.segment_log2, 0
-        if counts[tile] > 0:
-            stores, links = int(here != links), here
-        if counts[tile] % TILE_SEGMENT:
-            stores, sizes = stores + (here != sizes), here
-        events[CoarseRasterEvent.STORE_TRANSACTIONS] += stores
-        events[CoarseRasterEvent.STORE_BYTES] += stores * given.segment_bytes
-
-
-@kernel(lent=True)
-def _count_merge(given: CoarseInput, b: int, events: Any) -> None:
-    """Count the merges: a round takes whole segments until more than 512 entries wait, or none is left."""
-    write, read, batch, taken = 0, 0, 0, 0
-    total = given.starts[b + 1] - given.starts[b]
-    while read < total:
-        while write - read <= BLOCK:
-            events[CoarseRasterEvent.MERGES] += 1
-            while batch < given.batch_counts.shape[0] and taken == given.batch_counts[batch, b]:
-                batch, taken = batch + 1, 0
-            if batch == given.batch_counts.shape[0]:
-                break
-            events[CoarseRasterEvent.STREAM_READS] += 1
-            size = min(given.batch_counts[batch, b] - taken, BIN_SEGMENT)
-            taken, write = taken + size, write + size
-            warps = (size + WARP - 1) // WARP
-            events[CoarseRasterEvent.MERGE_WARPS] += warps
-            _count_load(events, 2, 2, 2 * given.segment_bytes)  # its count and the link to the next
-            segments = (size * ENTRY_BYTES + given.segment_bytes - 1) >> given.segment_log2
-            _count_load(events, warps, segments, segments * given.segment_bytes)
-        read += min(BLOCK, write - read)
-
-
 @kernel
 def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
     """Find the tiles of a bin's entries; fills ``counts`` (256,) by tile, returns pairs, (n, 2).
@@ -297,10 +147,10 @@ def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
     start, end = given.starts[b], given.starts[b + 1]
     pairs, used = np.empty((2 * (end - start), 2), np.int32), np.int64(0)
     if events is not None:
-        _count_merge(given, b, events)
+        count_merge(given, b, events)
         events[CoarseRasterEvent.BINS] += 1
         events[CoarseRasterEvent.TRIANGLES] += end - start
-        _count_atomic(events, 2)  # its draw, and room among the active tiles
+        count_atomic(events, 2)  # its draw, and room among the active tiles
     for read in range(start, end, BLOCK):
         m = min(BLOCK, end - read)
         longest_b, longest_c, cases = 0, 0, 0
@@ -317,7 +167,7 @@ def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
                 longest_b = max(longest_b, way.union if way.case == CASE_B else 0)
                 longest_c = max(longest_c, way.largest if way.case == CASE_C else 0)
                 cases |= 1 if way.case == CASE_A else 2
-                _count_warp(given, way, area, boxes, lanes, events)
+                count_case(given, way, area, boxes, lanes, events)
         if events is not None:
             events[CoarseRasterEvent.ROUNDS] += 1
             events[CoarseRasterEvent.LONGEST_B] += longest_b
@@ -325,7 +175,7 @@ def play_bin(given: CoarseInput, b: int, counts: Any, events: Any) -> Any:
             events[CoarseRasterEvent.CASE_A_ROUNDS] += cases & 1
             events[CoarseRasterEvent.WIDE_ROUNDS] += cases >> 1
             events[CoarseRasterEvent.ROUND_WARPS] += (m + WARP - 1) // WARP
-            _count_emits(given, counts, before, tails, events)
+            count_emits(given, counts, before, tails, events)
     if events is not None:
-        _count_tails(given, counts, tails, events)
+        count_tails(given, counts, tails, events)
     return pairs[:used]
