@@ -1,4 +1,4 @@
-"""A third less of the time that a kernel takes to compile, in Python that Numba leaves out of account.
+"""Less of the time that a kernel takes to compile (very roughly a third), in Python that Numba runs again and again.
 
 It looks anew for the implementation of each ``+``, ``[]`` and ``len`` of each line, through all that it knows by that
 name; nine of ten were found before. The collector looks again and again through all of the compiler's objects, nearly
