@@ -10,7 +10,6 @@ import numba
 import pytest
 
 from tilestamp.models import compile_cache, kernel_library
-from tilestamp.models.kernel import kernel
 
 compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled with NUMBA_DISABLE_JIT")
 
@@ -160,26 +159,6 @@ def test_counts_are_the_same_where_each_helper_is_compiled_by_itself(tmp_path):
         told += [subprocess.run(command, env=environment, capture_output=True, check=True).stdout]  # noqa: S603 - our own
     assert told[0] == told[1]
     assert told[0].startswith(b"[(")
-
-
-@compiled
-def test_a_function_of_numbas_own_that_a_kernel_calls_can_be_passed_to_another():
-    typed = numba.float64(numba.float64)
-
-    @numba.njit
-    def doubled(x):
-        return 2 * x
-
-    @kernel
-    def stage(x):
-        return doubled(x)
-
-    @numba.njit(numba.float64(numba.types.FunctionType(typed), numba.float64))
-    def applied(function, x):
-        return function(x)
-
-    assert stage(4.0) == 8.0
-    assert applied(doubled, 4.0) == 8.0
 
 
 @compiled
