@@ -146,8 +146,12 @@ class _Nesting(event.Listener):  # type: ignore[misc]
     @property
     def for_python(self) -> bool:
         """Whether Python may call what is being compiled: the kernel, or what others had Numba compile."""
-        last = self._dispatchers[-1]
-        return self.depth == 1 or not (hasattr(last, "compiles_for_kernels") or _module(last) in _CALLED_BY_KERNELS)
+        return self.depth == 1 or not (self.kernel or _module(self._dispatchers[-1]) in _CALLED_BY_KERNELS)
+
+    @property
+    def kernel(self) -> bool:
+        """Whether a kernel is being compiled."""
+        return hasattr(self._dispatchers[-1], "compiles_for_kernels")
 
 
 def _module(dispatcher: Any) -> str:
@@ -183,8 +187,10 @@ def outermost(codegen: Any) -> Iterator[None]:
         if nesting.for_python:
             kept["create_cpython_wrapper"](context, *described, **options)
 
-    def create_cfunc_wrapper(*_described: Any, **_options: Any) -> None:
-        """For C, which calls none."""
+    def create_cfunc_wrapper(context: Any, *described: Any, **options: Any) -> None:
+        """For C, which calls no kernel; of a function that others had Numba compile its address may be passed."""
+        if nesting.for_python and not nesting.kernel:
+            kept["create_cfunc_wrapper"](context, *described, **options)
 
     library_class = codegen._library_class  # noqa: SLF001
     event.register("numba:compile", nesting)

@@ -2,9 +2,11 @@
 
 import gc
 
+import numba
 import pytest
 
 from tilestamp.models.compile_quicker import REPLACED, quicker
+from tilestamp.models.kernel import kernel
 
 
 def _state():
@@ -32,3 +34,23 @@ def test_a_collector_that_was_off_stays_off():
         assert not gc.isenabled()
     finally:
         gc.enable()
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled with NUMBA_DISABLE_JIT")
+def test_a_function_of_numbas_own_that_a_kernel_calls_can_be_passed_to_another():
+    typed = numba.float64(numba.float64)
+
+    @numba.njit
+    def doubled(x):
+        return 2 * x
+
+    @kernel
+    def stage(x):
+        return doubled(x)
+
+    @numba.njit(numba.float64(numba.types.FunctionType(typed), numba.float64))
+    def applied(function, x):
+        return function(x)
+
+    assert stage(4.0) == 8.0
+    assert applied(doubled, 4.0) == 8.0
